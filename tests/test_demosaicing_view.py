@@ -1,5 +1,7 @@
 """The demosaicing visualizer shows true pictures and true numbers, and marks where false colour must be."""
 
+import re
+
 import cv2
 import numpy as np
 import pytest
@@ -9,10 +11,11 @@ from camviz import mosaics
 from camviz.mosaics import BAYER, PATTERNS, XTRANS
 from camviz.scenes import to_display, to_linear
 from camviz.scenes.photographs import photograph
+from camviz.views.yours import YOURS_HERE
 from camviz_school.course.material import module
-from camviz_school.views.demosaicing import LAYOUTS, LOUPE, DemosaicingView, _everywhere, nearest_carrier
+from camviz_school.views.demosaicing import LOUPE, DemosaicingView, _everywhere, nearest_carrier
 
-edge_green, malvar_green = module("12").edge_green, module("12").malvar_green
+edge_green, malvar_green, mosaic = module("12").edge_green, module("12").malvar_green, module("12").mosaic
 
 
 def attached(picture, name):
@@ -73,7 +76,7 @@ def test_the_nearest_carrier_is_found_through_the_sampling_grid():
     np.testing.assert_allclose(away, (0.05, 0.02), atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["RGGB", "X-Trans", "RGBW"])
+@pytest.mark.parametrize("name", ["RGGB", "X-Trans", "RGBW", "quad-Bayer"])
 def test_the_rings_stand_where_even_false_colour_is(name):
     """At a ring, and not between rings, a coarse blur leaves colour."""
     view = DemosaicingView(pattern=name)
@@ -106,7 +109,14 @@ def test_every_pattern_and_algorithm_is_drawn():
         for algorithm in DemosaicingView.controls()["algorithm"].choices:
             view = DemosaicingView(picture="garden", pattern=pattern, algorithm=algorithm)
             assert view.measures.psnr_db > 15
-    assert set(PATTERNS) - set(DemosaicingView.controls()["pattern"].choices) == {"monochrome"}
+    offered = set(DemosaicingView.controls()["pattern"].choices)
+    assert set(PATTERNS) - offered == {"monochrome"}
+    assert offered - set(PATTERNS) == {"quad-Bayer"}
+
+
+def test_quad_bayer_has_each_of_bayers_filters_two_by_two_times():
+    tile = np.array(DemosaicingView(pattern="quad-Bayer").filters.tile)
+    np.testing.assert_array_equal(tile, np.kron(np.array(BAYER["RGGB"].tile), np.ones((2, 2), int)))
 
 
 def test_blur_before_sampling_takes_false_colour_away_and_detail_with_it():
@@ -157,6 +167,10 @@ def nothing_yet(around):
     """Not written yet."""
 
 
+def no_mosaic_yet(picture, tile):
+    """Not written yet."""
+
+
 @pytest.mark.parametrize(("function", "algorithm"), [(malvar_green, "Malvar"), (edge_green, "edge-aware")])
 @pytest.mark.parametrize("pattern", BAYER)
 def test_a_right_green_of_the_readers_makes_the_algorithms_picture(pattern, function, algorithm):
@@ -166,9 +180,12 @@ def test_a_right_green_of_the_readers_makes_the_algorithms_picture(pattern, func
     pixels, problem = view.your_picture
     assert problem == ""
     np.testing.assert_allclose(pixels.astype(int), view.rebuilt, atol=1)
-    figure = view.figure()
+    figure = view.but(panels="picture yours figures").figure()
     assert cv2.PSNR(attached(figure, "yours"), pixels) > 27
-    assert figure.body.count(f"PSNR {view.measures.psnr_db:.2f} dB") == 2
+    worth = f"{view.measures.psnr_db:.2f} dB"
+    assert {worth, f"{worth}, ΔC = {view.measures.false_colour:.1f}"} <= set(
+        re.findall(r">([^<>]+)</text>", figure.svg())
+    )
     other = view.but(yours=lambda around: function(around) + 0.05)
     assert other.measures == view.measures
     assert mosaics.psnr(other.your_picture[0], view.truth) < view.measures.psnr_db
@@ -189,16 +206,64 @@ def test_a_function_without_an_answer_leaves_its_picture_empty_and_a_sentence_in
     view = DemosaicingView(panels="picture yours", pattern=pattern, yours=function, show=show)
     figure = view.figure()
     assert "yours" not in figure.photographs
-    assert sentence in words(figure.svg())
+    assert (YOURS_HERE if function is nothing_yet else sentence) in words(figure.svg())
+
+
+def test_what_awaits_a_readers_function_is_the_right_picture_greyed():
+    waiting = DemosaicingView(panels="picture yours", your_mosaic=no_mosaic_yet).figure()
+    assert 'class="awaited"' in waiting.svg()
+    broken = DemosaicingView(panels="picture yours", your_mosaic=lambda picture, tile: picture).figure()
+    assert 'class="awaited"' not in broken.svg()
+
+
+@pytest.mark.parametrize("show", ["rebuilt", "mosaic", "false colour"])
+@pytest.mark.parametrize("pattern", ["RGGB", "GBRG", "X-Trans", "quad-Bayer"])
+def test_a_right_mosaic_of_the_readers_makes_the_same_picture(pattern, show):
+    view = DemosaicingView(picture="garden", panels="picture yours", pattern=pattern, show=show, your_mosaic=mosaic)
+    pixels, problem = view.your_picture
+    assert problem == ""
+    right = to_display(mosaics.in_colour(view.measured, view.filters)) if show == "mosaic" else view.rebuilt
+    np.testing.assert_allclose(pixels.astype(int), right, atol=1)
+    wrong = view.but(your_mosaic=lambda picture, tile: mosaic(picture, tile[:, ::-1]))
+    assert np.abs(wrong.your_picture[0].astype(int) - right).max() > 50
+
+
+def test_a_mosaic_is_taken_of_blurred_light():
+    view = DemosaicingView(panels="picture yours", spots_px=1.0, your_mosaic=mosaic)
+    np.testing.assert_allclose(view.your_picture[0].astype(int), view.rebuilt, atol=1)
 
 
 def test_a_view_opens_with_the_panels_that_are_asked_for():
-    few, some, all_of_them = (DemosaicingView(panels=one).figure() for one in list(LAYOUTS)[:3])
-    assert "Spectrum" not in few.svg()
-    assert "PSNR" not in few.svg()
-    assert "PSNR" in some.svg()
-    assert "Spectrum" not in some.svg()
-    assert "carrier" not in some.description
-    assert "Spectrum" in all_of_them.svg()
+    alone = DemosaicingView(panels="picture").figure()
+    assert [tile.name for tile in alone.tiles] == ["picture"]
+    assert "PSNR" not in alone.description
+    assert "drag the loupe" not in alone.svg()
+    numbered = DemosaicingView(panels="picture figures").figure()
+    assert "PSNR" in numbered.description
+    assert "carrier" not in numbered.description  # it speaks of what is under the loupe
+    assert "carrier" in DemosaicingView(panels="picture loupe figures").figure().description
     with pytest.raises(ValueError, match="panels"):
         DemosaicingView(panels="loupe")
+
+
+@pytest.mark.parametrize("name", DemosaicingView.openable)
+def test_a_button_opens_a_panel_and_closes_it(name):
+    closed = DemosaicingView(panels="picture")
+    opened = closed.with_panels({name: True})
+    assert [tile.name for tile in opened.figure().tiles] == ["picture", name]
+    assert opened.with_panels({name: False}) == closed
+
+
+@pytest.mark.parametrize("panels", ["picture yours loupe figures", "picture loupe figures spectrum"])
+def test_panels_stand_beside_each_other_and_never_over_each_other(panels):
+    cells = [tile.cell for tile in DemosaicingView(panels=panels, yours=malvar_green).figure().tiles]
+    for i, (x, y, width, height) in enumerate(cells):
+        assert x + width <= 960
+        for left, top, *_ in cells[i + 1 :]:
+            assert left >= x + width or top >= y + height
+
+
+def test_the_rings_are_marked_where_something_explains_them():
+    alone, beside = (DemosaicingView(panels=one).figure().svg() for one in ("picture", "picture loupe"))
+    assert alone.count("paper-line") == 0
+    assert beside.count("paper-line") > 0

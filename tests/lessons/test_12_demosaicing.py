@@ -191,47 +191,42 @@ def test_four_pixels_in_one_would_be_a_quarter_of_the_pixels(says):
     assert made_up == 3 * megapixels.value - measured.value
 
 
-def test_grey_stripes_come_out_blue_under_the_loupe(says, plate):
-    says("Grey stripes went in, and blue came out.")
+def test_grey_stripes_come_out_blue_under_the_loupe_and_orange_with_the_filters_moved(says, plate):
+    says("Through the filters RGGB the loupe comes out blue there.")
+    says("It becomes orange.")
+    says("The bright stripes fell on the blue pixels, and now they fall on the red ones.")
+    says("In the middle of its coloured spot at the right side, the rings are upright stripes")
     u, v = DemosaicingView().at
-    red, green, blue = bilinear(sampled(plate, RGGB), RGGB)[v - 7 : v + 7, u - 7 : u + 7].mean(axis=(0, 1))
-    assert blue > green > red
+    assert DemosaicingView().frequency == pytest.approx((0.5, 0), abs=0.003)
     assert np.ptp(plate[v, u]) == 0
+    for tile, kind in ((RGGB, 1), (RGGB[:, ::-1], -1)):  # RG GB, and GR BG
+        red, green, blue = bilinear(sampled(plate, tile), tile)[v - 7 : v + 7, u - 7 : u + 7].mean(axis=(0, 1))
+        assert kind * blue > kind * green > kind * red
+        seen, near = filters(plate.shape[:2], tile), np.s_[v - 3 : v + 3, u - 3 : u + 3]
+        assert kind * (plate[near][seen[near] == 2].mean() - plate[near][seen[near] == 0].mean()) > 0.3
 
 
-def test_the_spots_walk_with_the_fineness_of_the_rings_and_leave_at_0_4(says):
-    wide, narrow = says("`finest rings` goes down from 0.6 to 0.4 cycles per pixel")
-    says("Large spots of colour stand at eight places.")
-    (sides,) = says("With 0.4 at the sides no stripe is as fine as that, and the eight spots are gone.")
-    (outside,) = says("and at 0.4 that lies outside the picture")
-    says("What stays is colour from pixel to pixel in the finest rings.")
+def test_the_spots_walk_with_the_fineness_of_the_rings_and_leave_with_coarse_ones(says):
+    says("Every ring in this picture is grey. The colours came out of a camera.")
+    says("Pull **finest rings** to the left, slowly, and watch where the colours go.")
+    says("they belong to a fineness, not to a place on the sensor")
+    finest, control = DemosaicingView().highest, DemosaicingView.controls()["highest"]
     spots = [(fu, fv) for fu in (-0.5, 0, 0.5) for fv in (-0.5, 0, 0.5) if fu or fv]
-    assert len(spots) == 8
-    assert np.abs(spots).max() <= wide.value
-    assert all(max(map(abs, spot)) > narrow.value for spot in spots)
-    assert sides.value == outside.value == narrow.value
+    assert np.abs(spots).max() <= finest
+    assert all(max(map(abs, spot)) > control.low for spot in spots)
     blurred, fine = {}, {}
-    for highest in (wide.value, narrow.value):
+    for highest in (finest, 0.4, control.low):
         shown = bilinear(sampled(zone_plate(256, highest), RGGB), RGGB)
         tint = shown - shown.mean(axis=-1, keepdims=True)
         blurred[highest] = np.abs(cv2.GaussianBlur(tint, (0, 0), 3)[20:-20, 20:-20]).max()
         fine[highest] = np.abs(tint).mean()
-    assert blurred[narrow.value] < blurred[wide.value] / 4
-    assert fine[narrow.value] > fine[wide.value] / 2
-
-
-def test_coarser_rings_move_outwards_all_of_them(says):
-    says("When the rings get coarser, each ring and each fineness lies farther out.")
-    size = 4096
-    radii = {}
-    for highest in (0.06, 0.04):
-        line = np.cos(2 * np.pi * highest / 256 * (np.arange(size) / 16) ** 2)
-        radii[highest] = np.flatnonzero(np.diff(np.sign(line)))[:10]
-    assert (radii[0.04] > radii[0.06]).all()
+    assert blurred[0.4] < blurred[finest] / 4
+    assert fine[control.low] < fine[finest] / 2
 
 
 def test_the_two_kinds_of_false_colour(says):
-    says("orange against blue at the sides, green against magenta in the corners")
+    says("the stripes come out orange or blue")
+    says("In the corners green stands against magenta")
     v, u = np.mgrid[:16, :16]
     for phase in (1, -1):
         across, both = (
@@ -247,7 +242,7 @@ def test_the_two_kinds_of_false_colour(says):
 def test_what_a_person_notices(says):
     (about,) = says("A person notices about 2.")
     assert about.about(JUST_NOTICEABLE, 0.15)
-    (threshold,) = says("changed by more than a person notices, 2.3 units of CIELAB")
+    (threshold,) = says("whose contrast to that neighbour changed by more than a person notices, 2.3 units of CIELAB")
     assert threshold == JUST_NOTICEABLE
 
 
@@ -272,9 +267,7 @@ def test_the_pixel_taken_by_hand_is_green_and_its_tile_begins_again_after_two(sa
     place = int(row.value), int(column.value)
     assert seen[place] == seen[int(next_row.value), place[1]] == seen[place[0], int(next_column.value)] == 1
     assert (next_row.value - row.value, next_column.value - column.value) == RGGB.shape
-    (wide,) = says("Her eye, 50 pixels wide, under two tiles")
-    assert wide == 272 - 222
-    v, u = says("First one pixel: (100, 240) has a red filter.")
+    v, u = says("Green first, for one pixel: (100, 240) has a red filter.")
     assert seen[int(v.value), int(u.value)] == 0
 
 
@@ -350,9 +343,9 @@ def test_a_phase_off_by_one_row_mixes_up_green(says):
 
 
 def test_stripes_of_half_a_cycle_are_orange_to_red_and_blue_but_not_to_green(says):
-    says("So all red pixels see bright stripes, and all blue pixels see dark ones.")
-    says("the stripes come out orange. Move them by one pixel, and they come out blue.")
-    says("On an orange surface they would all be alike; here they are bright in one row and dark in the next.")
+    says("So all red pixels see bright stripes and all blue ones dark stripes, or the other way round.")
+    says("the stripes come out orange or blue")
+    says("on an orange surface they would all be alike, and here they are bright in one row and dark in the next")
     measured = sampled(stripes(0.5), RGGB)
     assert np.ptp(measured[::2, ::2]) < 1e-12
     assert np.ptp(measured[1::2, 1::2]) < 1e-12
@@ -364,7 +357,7 @@ def test_stripes_of_half_a_cycle_are_orange_to_red_and_blue_but_not_to_green(say
 
 
 def test_a_grey_chessboard_is_an_even_magenta_to_the_sensor(says):
-    says("A grey chessboard of single pixels is bright at all red and all blue pixels, and dark at all green ones.")
+    says("a grey chessboard of single pixels is bright at all red and all blue pixels, and dark at all green ones")
     says("An evenly magenta surface gives the very same numbers.")
     v, u = np.mgrid[:12, :12]
     board = np.repeat(np.where((u + v) % 2 == 0, 0.9, 0.1)[..., None], 3, axis=-1)
@@ -507,7 +500,6 @@ def test_the_order_changes_from_one_picture_to_the_next(says, astronaut):
 
 
 def test_a_picture_that_was_interpolated_holds_less_that_is_hard_to_guess(says, astronaut):
-    says("An algorithm looks better on it than it is.")
     says("so it holds little that is hard to guess")
     interpolated, smoothed = bilinear(sampled(astronaut, RGGB), RGGB), cv2.GaussianBlur(astronaut, (0, 0), 0.7)
     reached = []
@@ -521,6 +513,8 @@ def test_a_picture_that_was_interpolated_holds_less_that_is_hard_to_guess(says, 
 def test_the_filters_of_malvar_are_five_pixels_wide(says):
     rows, columns = says("It is one filter of 5 × 5 pixels for each case, the same everywhere, without decisions.")
     again, once_more = says("Windows of 5 × 5 pixels of a Bayer mosaic")
+    others, too = says("You get windows of 5 × 5 pixels of a Bayer mosaic, each centred on a red or a blue pixel.")
+    assert (others.value, too.value) == (again.value, once_more.value)
     point = np.zeros((21, 21))
     point[10, 10] = 1.0
     reach = np.argwhere(np.abs(colour_demosaicing.demosaicing_CFA_Bayer_Malvar2004(point, "RGGB")).sum(axis=-1) > 1e-9)
@@ -529,12 +523,6 @@ def test_the_filters_of_malvar_are_five_pixels_wide(says):
 
 
 def test_what_decibels_say(says):
-    a, b = says("On one photograph, algorithm A reaches 36 dB and B 34 dB.")
-    ten, exponent, tenth, ratio = says("Yes: 10^(−2/10) = 0.63.")
-    assert exponent.value == b.value - a.value
-    assert ratio == ten.value ** (exponent.value / tenth.value)
-    says("A's mean squared error there is about two thirds of B's.")
-    assert ratio.value == pytest.approx(2 / 3, rel=0.06)
     (factor,) = says(
         "The usual measure is the peak signal-to-noise ratio (PSNR), 10 log₁₀(1 / mean squared error), in dB."
     )
@@ -574,7 +562,7 @@ def test_xtrans_has_more_and_weaker_carriers(says, plate):
 
 def test_rgbw_has_an_eighth_of_red_and_carriers_at_a_quarter(says):
     says("gives half of its pixels no filter at all")
-    says("there remain an eighth of the pixels for red and an eighth for blue")
+    says("There remain an eighth of the pixels for red and an eighth for blue.")
     np.testing.assert_array_equal(RGBW, PATTERNS["RGBW"].tile)
     assert [np.mean(channel == RGBW) for channel in (0, 2, 3)] == [1 / 8, 1 / 8, 1 / 2]
     (strongest,) = says("The strongest carrier is as strong as Bayer's, 1.63, and lies at ¼ cycle per pixel")
@@ -586,7 +574,7 @@ def test_rgbw_has_an_eighth_of_red_and_carriers_at_a_quarter(says):
 
 
 def test_the_four_phases_differ_in_phase_only(says, plate):
-    says("The figures stay, and the colours in the spots change")
+    says("where the filters are moved by one column, orange and blue change places")
     truth, at = encoded(plate), round(127.5 + 0.5 * 256 / 1.2)
     figures, spots = [], []
     for tile in (RGGB, RGGB[:, ::-1], RGGB[::-1], RGGB[::-1, ::-1]):
@@ -601,23 +589,83 @@ def test_the_four_phases_differ_in_phase_only(says, plate):
 
 
 def test_quartz_takes_false_colour_and_detail(says, plate):
-    (end,) = says("Move **blur before sampling** from 0 to 1 and on to 1.5, and watch *false colour* and *PSNR*.")
+    (end,) = says("Move **blur before sampling** from 0 to 1 and on to 1.5.")
     assert end.value == DemosaicingView().controls()["spots_px"].high
-    before, after, at, best = says(
-        "False colour falls from 18.7 to 3.4 at 1 px. PSNR rises at first, to 19.3 dB at half a pixel, and then falls"
-    )
-    truth, tint, psnr = encoded(plate), {}, {}
-    for d in (0, 0.5, 1, end.value):
-        measured = sampled(behind_quartz(plate, d), RGGB)
-        shown = encoded(mosaics.malvar(measured, BAYER["RGGB"]))
-        tint[d], psnr[d] = false_colour(shown, truth), decibels(shown, truth)
-        other = encoded(colour_demosaicing.demosaicing_CFA_Bayer_Malvar2004(measured, "RGGB"))  # unlike at the border
-        assert tint[d] == pytest.approx(false_colour(other, truth), abs=0.25)
-        assert psnr[d] == pytest.approx(decibels(other, truth), abs=0.1)
+    before, after, at = says("It falls from 25.5 to 6.3 at 1 px.")
+    says("The fine rings fade as well: the blur takes detail too.")
+    truth, tint, contrast = encoded(plate), {}, {}
+    for d in (0, 1, end.value):
+        shown = bilinear(sampled(behind_quartz(plate, d), RGGB), RGGB)
+        tint[d] = false_colour(encoded(shown), truth)
+        contrast[d] = shown.mean(axis=-1)[100:156, 200:220].std()
     assert before == tint[0]
     assert after == tint[at.value]
-    assert best == psnr[0.5]
-    assert psnr[0] < psnr[0.5] > psnr[1] > psnr[end.value]
+    assert contrast[1] < contrast[0] / 2
+
+
+def quad(tile=RGGB):
+    return np.kron(tile, np.ones((2, 2), int))
+
+
+def test_quad_bayer_has_its_carriers_at_a_quarter(says):
+    (strongest,) = says(
+        "Stripes of ½ cycle per pixel do no harm, but all its carriers lie at ¼: the strongest has 1.00."
+    )
+    says("has each of Bayer's filters over two by two pixels")
+    found = strengths(quad())
+    assert strongest == max(found.values())
+    assert {min(f, 1 - f) for place in found for f in place} == {0, 0.25}
+    assert strength(quad(), 0.5, 0) < 1e-12
+
+
+def test_four_pixels_as_one(says):
+    """The sensor is Sony's IMX586 (press release of 23 July 2018: 48 effective megapixels, 0.8 µm)."""
+    pixels, wide = says("Sony's quad-Bayer sensor of 2018 has 48 million pixels, each 0.8 µm wide.")
+    assert (pixels.value, wide.value) == (48, 0.8)
+    (left,) = says("and 12 million pixels remain, which form an ordinary Bayer mosaic")
+    assert left == pixels.value / 4
+    counted, again, root = says("A pixel that counts 25 electrons scatters by √25 = 5 of them, one fifth (lesson 15).")
+    assert counted.value == again.value
+    says("The mean of four such pixels scatters by half as much, one tenth.")
+    light = np.random.default_rng(0).poisson(counted.value, (400, 400))
+    means = lesson12.binned(light)
+    assert root == np.sqrt(counted.value)
+    assert light.std() == pytest.approx(root.value, rel=0.02)
+    assert light.std() / light.mean() == pytest.approx(1 / 5, rel=0.02)
+    assert means.std() / means.mean() == pytest.approx(1 / 10, rel=0.02)
+    (brightest,) = says("Here is her face in dim light, at most 25 electrons a pixel, from a quad-Bayer sensor.")
+    assert brightest.value == counted.value
+
+
+def test_the_binned_mosaic_is_bayers(says):
+    (width,) = says("from a quad-Bayer mosaic (2 h, 2 w) the Bayer mosaic (h, w)")  # the other 2 is a coefficient
+    flat = np.broadcast_to([0.9, 0.5, 0.2], (12, 16, 3))
+    made = lesson12.binned(sampled(flat, quad()))
+    assert made.shape == (12 / width.value, 16 / width.value)
+    np.testing.assert_allclose(made, sampled(flat, RGGB)[:6, :8])
+    says("One pixel farther to the right, each would mix two colours.")
+    mixed = lesson12.binned(np.roll(sampled(flat, quad()), -1, axis=1))
+    assert not set(np.round(mixed.ravel(), 9)) <= {0.9, 0.5, 0.2}
+
+
+def test_binning_blurs_before_the_larger_pixels_are_sampled(says):
+    (kept,) = says("the mean of two pixels keeps cos(π · ¼) = 0.71 of stripes of ¼ cycle per pixel")
+    assert kept == np.abs(np.exp(2j * np.pi / 4 * np.arange(2)).mean()) == pytest.approx(np.cos(np.pi / 4))
+    says("So false colour becomes weaker there, and does not go.")
+    f = 0.24
+    plain = bilinear(sampled(stripes(2 * f), RGGB), RGGB)  # by pixels twice as large that see one line each
+    small = np.repeat(stripes(f, 32, 800)[..., :1], 3, axis=-1)
+    shown = bilinear(lesson12.binned(sampled(small, quad())), RGGB)
+    swings = [np.ptp((one[..., 0] - one[..., 2])[4:12, 8:-8]) for one in (plain, shown)]
+    assert 0.5 * swings[0] < swings[1] < 0.85 * swings[0]
+
+
+def test_binning_the_dim_face_takes_noise_away(says):
+    says("The noise is weaker, and the detail coarser.")
+    light = decoded(photograph("astronaut")[:240, :320])[20:180, 140:300]
+    clean, dim = sampled(light, quad()), np.random.default_rng(12).poisson(25 * sampled(light, quad())) / 25
+    errors = [np.std(one) for one in (dim - clean, lesson12.binned(dim) - lesson12.binned(clean))]
+    assert errors[1] == pytest.approx(errors[0] / 2, rel=0.05)
 
 
 def spots(*plates):
@@ -649,7 +697,7 @@ def test_two_crossed_plates_make_two_spots_and_a_quarter_wave_plate_between_them
     (turn,) = says("A second plate, turned by 90°, would move only one of them: two spots still.")
     crossed = np.radians(turn.value)
     assert len(spots((1, 0), (1, crossed))) == 2
-    says("So a thin layer stands between the two, a quarter-wave plate")
+    says("So a quarter-wave plate stands between the two")
     says("Then the second plate splits both, and four spots stand in a square, d pixels wide.")
     square = spots((1, 0), (None, np.pi / 4), (1, crossed))
     assert square == pytest.approx({(0, 0): 0.25, (1, 0): 0.25, (0, 1): 0.25, (1, 1): 0.25})
@@ -657,7 +705,8 @@ def test_two_crossed_plates_make_two_spots_and_a_quarter_wave_plate_between_them
 
 
 def test_blurring_afterwards_does_nothing(says):
-    f, wide = says("after sampling, stripes of 0.48 cycles per pixel have become bands 50 pixels wide")
+    f, wide = says("After that, stripes of 0.48 cycles per pixel have become bands 50 pixels wide")
+    says("The same blur takes nearly all of the colour away before the sampling, and nothing after it.")
     assert wide == 1 / beat(f.value)
     plain = bilinear(sampled(stripes(f.value, 64), RGGB), RGGB)
     before = bilinear(sampled(behind_quartz(stripes(f.value, 64), 1.0), RGGB), RGGB)
@@ -767,6 +816,24 @@ def test_equal_channels_prove_a_grey_file_only(says, samples):
     np.testing.assert_array_equal(picture[..., 0], turned)
 
 
+def test_edge_aware_leaves_false_colour_at_the_corners_of_a_board(says, samples):
+    says("false colour lies along all edges. Edge-aware leaves it at the corners of the squares")
+    grey = cv2.imread(str(samples / "left01.jpg"))[100:356, 240:496]
+    _, corners = cv2.findChessboardCornersSB(cv2.imread(str(samples / "left01.jpg"), cv2.IMREAD_GRAYSCALE), (9, 6))
+    at = np.rint(corners.reshape(-1, 2)).astype(int) - (240, 100)
+    near = np.zeros(grey.shape[:2])
+    for u, v in at[(at > 8).all(axis=-1) & (at < 248).all(axis=-1)]:
+        near[v - 4 : v + 5, u - 4 : u + 5] = 1
+    inside = np.s_[20:200, 20:236]  # the board alone
+    share = {}
+    for name, shown in (("bilinear", bilinear), ("edge-aware", lambda measured, _: hamilton_adams(measured))):
+        labs = colour.XYZ_to_Lab(colour.sRGB_to_XYZ(encoded(shown(sampled(decoded(grey), RGGB), RGGB)) / 255))
+        tint = np.hypot(labs[..., 1], labs[..., 2])[inside]
+        share[name] = tint[near[inside] > 0].sum() / tint.sum()
+    assert share["edge-aware"] > 2 * share["bilinear"]
+    assert share["edge-aware"] > 0.3
+
+
 def test_the_lines_for_a_raw_file_take_the_dark_to_zero_and_a_full_pixel_to_one(monkeypatch, says):
     (largest,) = says("larger ones are averaged down to 256 pixels in linear light")
     shown = DemosaicingView(photograph=np.zeros((300, 500, 3), np.uint8)).truth
@@ -824,8 +891,8 @@ def above(question):
 @pytest.mark.parametrize(
     ("question", "words"),
     [
-        ("12.measured", r"explore\(|two thirds|interpolat|one of|each pixel|guess"),
-        ("12.coarser", r"half a cycle|½ cycle|outwards and|leave the picture"),
+        ("12.measured", r"two thirds|interpolat|one of|each pixel|guess"),
+        ("12.shifted", r"becomes orange|change places|which colour sees|other columns"),
         ("12.names", r"BGGR|second row|exchanged|Bayer(RG|BG)2"),
         ("12.blur", r"too late|low-pass|four spots 0|coarse and soft|afterwards"),
     ],
@@ -864,19 +931,26 @@ def test_before_the_lesson_the_first_column_cut_off(says):
     assert "".join(letters[laid_out[1]]) == "GBGB"
 
 
-def test_before_the_lesson_three_decibels(says):
-    a, b = says("algorithm A reaches 40 dB and B 37 dB")
-    tens, decibels, per, ratio = says("Yes: 10^(−3/10) = 0.50.")
-    assert decibels == -(a.value - b.value)
-    assert tens.value == per.value == 10  # tenths of a power of ten
-    truth = np.zeros(100)
-    errors = [np.full(100, 10 ** (-one.value / 20)) for one in (a, b)]
-    assert decibels_apart(errors, truth) == pytest.approx(a.value - b.value)
-    assert ratio == np.mean(errors[0] ** 2) / np.mean(errors[1] ** 2)
-    says("A's mean squared error on it is half of B's.")
+def test_before_the_lesson_the_red_light(says):
+    megapixels, pixels = says("A camera of 20 megapixels takes a colour photograph of 20 million pixels.")
+    assert megapixels.value == pixels.value
+    (everywhere,) = says("In 20 million: at every pixel.")
+    assert everywhere.value == pixels.value
+    (third,) = says("In 6.7 million: at every third pixel.")
+    assert third == pixels.value / 3
+    (quarter,) = says("In 5 million: at every fourth pixel.")
+    assert quarter == pixels.value * np.mean(RGGB == 0)
 
 
-def decibels_apart(pictures, truth):
-    """Of two pictures, by OpenCV."""
-    one, other = (cv2.PSNR(picture, truth, R=1.0) for picture in pictures)
-    return one - other
+def test_the_quiz_about_the_green_numbers(says):
+    of, again = says(
+        "A sensor of 48 megapixels under Bayer's filters takes a photograph. How many of its 48 million green numbers "
+        "were guessed?"
+    )
+    assert of.value == again.value
+    (green,) = says("24 million.")
+    assert green == of.value * np.mean(RGGB != 1)
+    (others,) = says("Of red and blue, 36 million each are guessed.")
+    assert others == of.value * np.mean(RGGB != 0) == of.value * np.mean(RGGB != 2)
+    (all_alike,) = says("32 million: two thirds.")
+    assert all_alike == of.value * 2 / 3

@@ -37,7 +37,7 @@ PICTURES = {
     "epipolar": EpipolarView(right_x=0.15, right_z=0.9, yaw=0.0, depth=3.0, panels="right epipoles"),
     "rectification": RectificationView(),
     "colour": ColourView(),
-    "demosaicing": DemosaicingView(),
+    "demosaicing": DemosaicingView(panels="picture loupe"),
     "depth_of_field": DepthOfFieldView(),
     "fisheye": FisheyeView(panels="picture curves"),
     "image_sensor": ImageSensorView(),

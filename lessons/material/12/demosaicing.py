@@ -1,11 +1,11 @@
 """The demosaicing visualizer: a mosaic, the picture rebuilt from it, what is false in it, and where that had to be.
 
-A reader's own guess of green can rebuild a second picture beside the first.
+A reader's own mosaic, or guess of green, can make a second picture beside the first.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 
 from camviz import mosaics
 from camviz.draw import plot, svg
-from camviz.draw.flow import rows, shortened
+from camviz.draw.flow import WIDTH, Cell, rows, shortened
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg, png
 from camviz.draw.readout import listed, readout, true_minus
 from camviz.draw.shades import heat_key, heat_map, heat_panel
 from camviz.lenses.base import Array
-from camviz.mosaics import ALGORITHMS, ANY_PATTERN, BAYER, PATTERNS, Carrier, Pattern
+from camviz.mosaics import ALGORITHMS, ANY_PATTERN, PATTERNS, Carrier, Pattern
 from camviz.mosaics.measures import Measures
 from camviz.scenes import to_display
 from camviz.views.base import View, choice, slider, without
@@ -33,14 +33,12 @@ from camviz_school.views.mosaic_steps import Source
 
 LOUPE = 14  # pixels across
 _KEY = 62  # units right of a picture, for the key of its map
-_BESIDE = (506, {"picture": 550, "loupe": 150, "numbers": 260})
-LAYOUTS = {
-    "picture loupe": shortened(rows(_BESIDE), numbers=90),
-    "picture loupe figures": shortened(rows(_BESIDE), numbers=190),
-    "picture loupe spectrum figures": rows(_BESIDE),
-    "picture yours": rows((494, {"picture": 480, "with your green": 480})),
-}
+_WIDE = {"picture": 366, "yours": 366, "loupe": 110, "figures": 220, "spectrum": 240}
+"""The panels in their order, and how wide each is in picture units."""
+_HIGH, _SIDE = 330, 76  # of a row, and of what the loupe shows
 _WORST = 60.0  # of the map of errors, in units of CIELAB
+_FILTERS = {name: one for name, one in PATTERNS.items() if name != "monochrome"}
+_FILTERS["quad-Bayer"] = Pattern.spelled("quad-Bayer", "RRGG RRGG GGBB GGBB")
 _TICKS = [(-0.5, "−½"), (0.0, "0"), (0.5, "½")]
 
 
@@ -48,39 +46,37 @@ _TICKS = [(-0.5, "−½"), (0.0, "0"), (0.5, "½")]
 class DemosaicingView(View):
     """A picture under a colour filter array, demosaiced. Light is linear in the mosaic, sRGB on the screen.
 
-    The loupe stands on the pixel (u, v). With `photograph` (height, width, 3) uint8, that is the picture. `panels` is
-    one of LAYOUTS. `yours` takes windows (n, 5, 5) of a Bayer mosaic around its red and blue pixels to a reader's
-    green (n,) in their middles; the picture that it makes stands beside the algorithm's, which makes red and blue.
+    The loupe stands on the pixel (u, v). With `photograph` (height, width, 3) uint8, that is the picture. `panels`
+    names what is drawn: the picture, and beside it any of yours, loupe, figures and spectrum. `yours` takes windows
+    (n, 5, 5) of a Bayer mosaic around its red and blue pixels to a reader's green (n,) in their middles, `your_mosaic`
+    takes a picture and a tile of channels to the mosaic; what comes of one of them stands in the panel yours.
     """
 
     title: ClassVar[str] = "Demosaicing"
-    layouts = LAYOUTS
+    openable: ClassVar[Mapping[str, str]] = {"loupe": "loupe", "figures": "numbers", "spectrum": "spectrum"}
 
     picture: str = choice("zone plate", "astronaut", "garden", help="grey rings, a photograph, or the virtual garden")
     highest: float = slider(
         0.6, 0.2, 0.7, 0.01, label="finest rings", unit="cycles/px", help="of the zone plate, at its sides"
     )
-    pattern: str = choice(*BAYER, "X-Trans", "RGBW", help="the filters over the pixels, from the upper left")
+    pattern: str = choice(*_FILTERS, help="the filters over the pixels, from the upper left")
     algorithm: str = choice("bilinear", *(one for one in ALGORITHMS if one != "bilinear"), help="how to rebuild it")
     spots_px: float = slider(
-        0.0,
-        0.0,
-        1.5,
-        0.05,
-        label="blur before sampling",
-        unit="px",
-        help="a birefringent filter: four spots, so far apart",
+        0.0, 0.0, 1.5, 0.05, label="blur before sampling", unit="px", help="by quartz: four spots, so far apart"
     )
     show: str = choice("rebuilt", "mosaic", "false colour", help="the large picture")
     u: float = 235.0
     v: float = 128.0
-    panels: str = "picture loupe spectrum figures"
+    panels: str = "picture loupe figures spectrum"
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
+    your_mosaic: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
     photograph: NDArray[np.uint8] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        own = self.photograph
+        own, wanted = self.photograph, self.panels.split()
+        if "picture" not in wanted or not set(wanted) <= {*_WIDE}:
+            raise ValueError(f"panels must be picture and any of {', '.join([*_WIDE][1:])}, got {self.panels!r}")
         if own is not None and not (own.dtype == np.uint8 and own.shape[2:] == (3,) and min(own.shape[:2]) >= LOUPE):
             takes = f"uint8 (height, width, 3), at least {LOUPE} pixels each way"
             raise ValueError(f"photograph must be {takes}, got {own.dtype} {own.shape}")
@@ -89,7 +85,7 @@ class DemosaicingView(View):
 
     @property
     def filters(self) -> Pattern:
-        return PATTERNS[self.pattern]
+        return _FILTERS[self.pattern]
 
     @property
     def used(self) -> str:
@@ -125,7 +121,11 @@ class DemosaicingView(View):
 
     @cached_property
     def your_picture(self) -> tuple[NDArray[np.uint8] | None, str]:
-        """The picture with the reader's green, as sRGB bytes (height, width, 3), or None and what is in the way."""
+        """The picture by the reader's function, as sRGB bytes (height, width, 3), or None and what is in the way."""
+        if self.your_mosaic is not None:
+            light = mosaics.low_pass(mosaic_steps.light(self.source), self.spots_px)
+            measured, problem = tried(self.your_mosaic, (light, np.array(self.filters.tile)), self.measured)
+            return (None, problem) if problem else (self._developed(measured), "")
         if self.yours is None:
             return None, "No function of yours has been given."
         if not self.filters.is_bayer:
@@ -136,6 +136,12 @@ class DemosaicingView(View):
             return None, problem
         return to_display(mosaics.with_green(self.measured, self.filters, green, self.used)), ""
 
+    def _developed(self, measured: Array) -> NDArray[np.uint8]:
+        """A mosaic as sRGB bytes (height, width, 3): in the colours of its filters where that is shown, or rebuilt."""
+        if self.show == "mosaic":
+            return to_display(mosaics.in_colour(measured, self.filters))
+        return to_display(mosaics.demosaic(measured, self.filters, self.used))
+
     @property
     def frequency(self) -> Array | None:
         """Of the zone plate's rings under the loupe, (fu, fv) in cycles/pixel; None on another picture."""
@@ -143,6 +149,11 @@ class DemosaicingView(View):
             return None
         size = self.truth.shape[0]
         return (np.array(self.at) - 0.5 - (size - 1) / 2) * 2 * self.highest / size
+
+    @property
+    def _size(self) -> tuple[int, int]:
+        """The picture's width and height."""
+        return self.truth.shape[1], self.truth.shape[0]
 
     @property
     def at(self) -> tuple[int, int]:
@@ -162,13 +173,15 @@ class DemosaicingView(View):
         }
 
     def _told(self) -> dict[str, str]:
-        figures, loupe = self.numbers(), self._under_the_loupe()
-        if "yours" in self.panels:
-            return {name: value for name, value in figures.items() if name not in loupe}
-        if "spectrum" not in self.panels:
-            figures.pop("carrier", None)
-        wanted = figures if "figures" in self.panels else ("false colour",)
-        return {name: value for name, value in figures.items() if name in wanted}
+        """The figures that the panels speak of."""
+        if not self._has("figures"):
+            return {}
+        loupe = {} if self._has("loupe") else self._under_the_loupe()
+        told = {name: one for name, one in self.numbers().items() if name not in loupe}
+        if self.yours and self.show != "mosaic" and (pixels := self.your_picture[0]) is not None:
+            psnr_db, false_colour = mosaics.psnr(pixels, self.truth), mosaics.false_colour(pixels, self.truth)
+            told["yours"] = f"{psnr_db:.2f} dB, ΔC = {false_colour:.1f}"
+        return told
 
     def _under_the_loupe(self) -> dict[str, str]:
         if self.frequency is None:
@@ -180,90 +193,87 @@ class DemosaicingView(View):
         return {"loupe at": true_minus(f"({fu:.2f}, {fv:.2f}) cycles/px"), "carrier": f"{_place(near)}: {beat}"}
 
     def description(self) -> str:
-        figures = listed(self._told())
+        figures = f": {listed(self._told())}" if self._has("figures") else ""
         blur = f"four spots {self.spots_px:g} px apart" if self.spots_px else "no blur before sampling"
         name = "a photograph" if self.photograph is not None else f"the {self.picture}"
         rings = f" up to {self.highest:g} cycles/px" if self.frequency is not None else ""
-        return f"{name}{rings} under {self.pattern}, {blur}, by {self.used}: {figures}. Shown: {self.show}."
+        return f"{name}{rings} under {self.pattern}, {blur}, by {self.used}{figures}. Shown: {self.show}."
 
     # What it looks like ----------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
         photographs: dict[str, bytes] = {}
-        parts = {"picture": self._large_panel(photographs, draft)}
-        if "yours" in self.panels:
-            parts["with your green"] = self._your_panel(photographs, draft)
-        else:
-            parts |= {
-                "loupe": self._loupe_panels(photographs),
-                "numbers": readout(self._told(), (710, 26), (0, 37), (0, 17)),
-            }
-            if self._has("spectrum"):
-                parts["numbers"] += self._spectrum_panel(photographs)
-        return self.tiled(LAYOUTS[self.panels], parts, photographs)
+        draw: dict[str, Callable[[], str]] = {
+            "picture": lambda: self._large_panel(photographs, draft),
+            "yours": lambda: self._your_panel(photographs, draft),
+            "loupe": lambda: self._loupe_panels(photographs),
+            "figures": lambda: readout(self._told(), self._corner("figures", 8, 26), (0, 37), (0, 17)),
+            "spectrum": lambda: self._spectrum_panel(photographs),
+        }
+        return self.tiled(self._layout, {name: draw[name]() for name in self._layout}, photographs)
+
+    @cached_property
+    def _layout(self) -> dict[str, Cell]:
+        """As many panels in a row as it has room for, in their order."""
+        lines: list[dict[str, float]] = [{}]
+        for name in filter(self._has, _WIDE):
+            if sum(lines[-1].values()) + _WIDE[name] > WIDTH:
+                lines.append({})
+            lines[-1][name] = _WIDE[name]
+        return shortened(rows(*((_HIGH, line) for line in lines)), figures=37 * len(self._told()) + 12)
+
+    def _corner(self, tile: str, right: float, down: float) -> tuple[float, float]:
+        """A place in a tile, from its upper left corner."""
+        x, y, *_ = self._layout[tile]
+        return x + right, y + down
 
     @cached_property
     def _panel(self) -> Panel:
-        height, width = self.truth.shape[:2]
-        widest = LAYOUTS[self.panels]["picture"][2] - 20 - _KEY
-        return image_panel("picture", 10, 34, widest, width, height, tallest=widest)
+        widest = _WIDE["picture"] - 20 - _KEY
+        return image_panel("picture", 10, 34, widest, *self._size, tallest=widest)
 
     def _large_panel(self, photographs: dict[str, bytes], draft: bool) -> str:
-        height, width = self.truth.shape[:2]
-        if "yours" in self.panels:
-            marks, heading = self._predicted(), dict[str, Any]()
-            below = self._worth(self._panel, self.measures.psnr_db, self.measures.false_colour, "label")
-        else:
-            marks, below = self._predicted() + self._frame(), ""
+        marks, heading = self._predicted(), dict[str, Any]()
+        if self._has("loupe"):
             label = "The picture; drag or press the arrow keys to move the loupe"
-            heading = {"hint": "drag the loupe", "drag": "loupe", "label": label}
+            marks, heading = marks + self._frame(), {"hint": "drag the loupe", "drag": "loupe", "label": label}
         if self.show == "false colour":
-            return below + self._map_of_errors(
-                self._panel, self.measures.colour_error, photographs, draft, marks, **heading
-            )
-        pixels = to_display(mosaics.in_colour(self.measured, self.filters)) if self.show == "mosaic" else self.rebuilt
-        title = f"The mosaic, {self.pattern}" if self.show == "mosaic" else f"Rebuilt: {self._rebuilt_by()}"
-        photographs["picture"] = jpeg(pixels, 90)
-        return below + self._panel.show(
-            placed_image(self._panel, "picture", width, height) + marks, title=title, **heading
-        )
+            return self._map_of_errors(self._panel, self.measures.colour_error, photographs, draft, marks, **heading)
+        other = "" if self.used == self.algorithm else f" ({self.algorithm} is for Bayer's patterns)"
+        title = f"The mosaic, {self.pattern}" if self.show == "mosaic" else f"Rebuilt: {self.used}{other}"
+        photographs["picture"] = jpeg(self._developed(self.measured) if self.show == "mosaic" else self.rebuilt, 90)
+        return self._panel.show(placed_image(self._panel, "picture", *self._size) + marks, title=title, **heading)
 
     def _map_of_errors(
         self, panel: Panel, error: NDArray, photographs: dict[str, bytes], draft: bool, marks: str, **heading: Any
     ) -> str:
-        height, width = self.truth.shape[:2]
         coarse = cv2.resize(error, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) if draft else error
         photographs |= {panel.name: heat_map(coarse, 0, _WORST, "error"), f"{panel.name} key": heat_key("error")}
         heading = {"title": "What colour is false", **heading}
-        return heat_panel(panel, width, height, 0, _WORST, "ΔC", marks, **heading)
+        return heat_panel(panel, *self._size, 0, _WORST, "ΔC", marks, **heading)
 
     def _your_panel(self, photographs: dict[str, bytes], draft: bool) -> str:
-        """The picture by the reader's green, or what is in the way of it."""
-        panel, (pixels, problem) = replace(self._panel, name="yours", x=490), self.your_picture
-        height, width = self.truth.shape[:2]
+        """The picture by the reader's function, or what is in the way of it."""
+        (x, y), (pixels, problem) = self._corner("yours", 10, 34), self.your_picture
+        panel, title = replace(self._panel, name="yours", x=x, y=y), "With your green"
+        if self.your_mosaic is not None:
+            title = "Your mosaic" if self.show == "mosaic" else "Rebuilt from your mosaic"
         if pixels is None:
-            return without(panel, problem, "With your green", (16, 30))
-        worth = mosaics.psnr(pixels, self.truth), mosaics.false_colour(pixels, self.truth)
-        below = self._worth(panel, *worth, "orange")
+            return without(panel, problem, title, (16, 30), placed_image(panel, "picture", *self._size))
         if self.show == "false colour":
             error = mosaics.colour_error(pixels, self.truth)
             title = "What colour is false in yours"
-            return below + self._map_of_errors(panel, error, photographs, draft, self._predicted(), title=title)
+            return self._map_of_errors(panel, error, photographs, draft, self._predicted(), title=title)
         photographs["yours"] = jpeg(pixels, 90)
-        return below + panel.show(
-            placed_image(panel, "yours", width, height) + self._predicted(), title="With your green"
-        )
-
-    def _rebuilt_by(self) -> str:
-        return self.used if self.used == self.algorithm else f"{self.used} ({self.algorithm} is for Bayer's patterns)"
+        return panel.show(placed_image(panel, "yours", *self._size) + self._predicted(), title=title)
 
     def _predicted(self) -> str:
         """Rings on the zone plate where its frequency is one that the pattern takes for colour."""
-        if self.frequency is None:
+        if self.frequency is None or self.panels == "picture":
             return ""
         size = self.truth.shape[0]
         places = (size - 1) / 2 + _everywhere(self.filters, self.highest) * size / (2 * self.highest)
-        return _rings(self._panel.place(places), 13)
+        return _rings(self._panel.place(places), 9)
 
     def _frame(self) -> str:
         """The loupe's outline on the picture."""
@@ -283,29 +293,26 @@ class DemosaicingView(View):
         }
         body = ""
         for i, (name, pixels) in enumerate(seen.items()):
-            panel = Panel(f"loupe {name}", 560, 34 + 162 * i, 130, 130, 0, 1, 0, 1)
+            panel = Panel(f"loupe {name}", *self._corner("loupe", 6, 34 + 102 * i), _SIDE, _SIDE, 0, 1, 0, 1)
             photographs[panel.name] = png(np.ascontiguousarray(pixels))
-            content = svg.image(panel.name, 0, 0, 130, 130, style="image-rendering:pixelated")
+            content = svg.image(panel.name, 0, 0, _SIDE, _SIDE, style="image-rendering:pixelated")
             body += panel.show(content, title=name)
         return body
 
     def _spectrum_panel(self, photographs: dict[str, bytes]) -> str:
-        panel = plot.plot_panel("spectrum", 772, 232, 148, 148, (-0.5, 0.5), (0.5, -0.5))
+        x, y = self._corner("spectrum", 62, 34)
+        panel = plot.plot_panel("spectrum", x, y, 148, 148, (-0.5, 0.5), (0.5, -0.5))
         photographs["spectrum"] = jpeg(mosaic_steps.spectrum(self.source, self.filters, self.spots_px))
         places = _everywhere(self.filters, 0.5)
         content = svg.image("spectrum", 0, 0, panel.width, panel.height) + _rings(panel.place(places), 9)
         axes = plot.axes(panel, "fu [cycles/px]", "fv [cycles/px]", _TICKS, _TICKS)
-        listed = [svg.text((710, 440), "○ seen as colour, how strongly", "note")]
+        x, y = self._corner("spectrum", 4, 256)
+        listed = [svg.text((x, y), "○ seen as colour, how strongly", "note")]
         for i, carrier in enumerate(mosaics.carriers(self.filters)[:6]):
-            x, y = 710 + 120 * (i % 2), 459 + 18 * (i // 2)
-            listed.append(svg.text((x, y), f"{_place(carrier)}", "tick"))
-            listed.append(svg.text((x + 104, y), f"{carrier.strength:.2f}", "tick end"))
+            left, top = x + 118 * (i % 2), y + 19 + 18 * (i // 2)
+            listed.append(svg.text((left, top), f"{_place(carrier)}", "tick"))
+            listed.append(svg.text((left + 104, top), f"{carrier.strength:.2f}", "tick end"))
         return panel.show(content, title="Spectrum") + axes + "".join(listed)
-
-    def _worth(self, panel: Panel, psnr_db: float, false_colour: float, class_: str) -> str:
-        """What a rebuilt picture is worth, below it."""
-        words = f"PSNR {psnr_db:.2f} dB, false colour ΔC = {false_colour:.1f} on average"
-        return svg.paragraph((panel.x, panel.y + panel.height + 24), words, 460, class_)
 
     # What can be dragged ---------------------------------------------------------------------------------------------
 
@@ -354,15 +361,11 @@ def _rings(centres: Array, radius: float) -> str:
     return svg.path(lines, "paper-line") + svg.path(lines, "ink")
 
 
-_FRACTIONS = {0.5: "½", 0.25: "¼", 1 / 3: "⅓", 1 / 6: "⅙", 0.0: "0"}
+_FRACTIONS = {round(f, 9): name for f, name in ((0.5, "½"), (0.25, "¼"), (1 / 3, "⅓"), (1 / 6, "⅙"), (0, "0"))}
 
 
 def _place(carrier: Carrier) -> str:
     """A carrier's frequency in words: (½, 0)."""
-    words = []
-    for frequency in (carrier.fu, carrier.fv):
-        name = next(
-            (word for value, word in _FRACTIONS.items() if abs(abs(frequency) - value) < 1e-9), f"{frequency:.3g}"
-        )
-        words.append(("−" if frequency < 0 else "") + name)
-    return f"({', '.join(words)})"
+    named = [_FRACTIONS.get(round(abs(f), 9), f"{abs(f):.3g}") for f in (carrier.fu, carrier.fv)]
+    signs = ["−" if f < 0 else "" for f in (carrier.fu, carrier.fv)]
+    return f"({', '.join(map(str.__add__, signs, named))})"

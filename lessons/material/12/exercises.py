@@ -1,4 +1,4 @@
-"""Lesson 12, colour filter arrays: the mosaic, the false colour, two guesses of green, and the phase after a crop.
+"""Lesson 12, colour filter arrays: mosaic, false colour, the phase after a crop, binning, and two guesses of green.
 
 Tiles are arrays of channels (0 red, 1 green, 2 blue) that repeat from a mosaic's upper left pixel.
 """
@@ -141,7 +141,7 @@ def filters_repeated(picture, tile):
     return picture[v, u, tile[v // 2 % tile.shape[0], u // 2 % tile.shape[1]]]
 
 
-# 5: find the bug in the phase after a crop ---------------------------------------------------------------------------
+# 3: find the bug in the phase after a crop ---------------------------------------------------------------------------
 
 
 def cropped_tile(tile: Array, x0: int, y0: int) -> Array:
@@ -256,7 +256,126 @@ def turned_over(tile, x0, y0):
     return tile[:: (-1) ** y0, :: (-1) ** x0]
 
 
-# 3: green, with red's help -------------------------------------------------------------------------------------------
+# 4: four pixels as one -----------------------------------------------------------------------------------------------
+
+
+def binned(measured: Array) -> Array:
+    """A mosaic (h, w) of the means of two by two pixels of a mosaic (2 h, 2 w)."""
+    height, width = measured.shape
+    return measured.reshape(height // 2, 2, width // 2, 2).mean(axis=(1, 3))
+
+
+def _binned_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for shape in ((4, 4), (8, 4), (4, 12), (12, 8)):
+        yield (rng.normal(0.5, 1, shape),)
+    yield (rng.uniform(-2, -1, (8, 8)),)
+    yield (rng.uniform(30, 90, (8, 12)),)
+
+
+BINNED = Exercise(
+    name="12.binned",
+    reference=binned,
+    cases=_binned_cases,
+    tolerance=1e-6,
+    hints=(
+        "Write down the upper left eight by eight pixels of a quad-Bayer mosaic as letters. Which four of them become "
+        "the first pixel of the new mosaic, and which four the one to its right?",
+        "`measured[::2, ::2]` holds the upper left pixel of every square, and `measured[1::2, ::2]` the one below it. "
+        "There are two more such arrays. Or give the mosaic four axes, `(h, 2, w, 2)`, and take the mean over two.",
+        "`return measured.reshape(height // 2, 2, width // 2, 2).mean(axis=(___, ___))`",
+    ),
+    praise="Four pixels of one colour have become one, and the mosaic is an ordinary Bayer mosaic.",
+)
+
+
+@BINNED.right
+def four_arrays(measured):
+    return (measured[::2, ::2] + measured[1::2, ::2] + measured[::2, 1::2] + measured[1::2, 1::2]) / 4
+
+
+@BINNED.right
+def square_by_square(measured):
+    made = np.empty((len(measured) // 2, len(measured[0]) // 2))
+    for v, u in np.ndindex(made.shape):
+        made[v, u] = np.mean(measured[2 * v : 2 * v + 2, 2 * u : 2 * u + 2])
+    return made
+
+
+@BINNED.right
+def by_opencv_s_areas(measured):
+    import cv2
+
+    return cv2.resize(measured, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+
+
+@BINNED.wrong("This is the *sum* of the four pixels. Their mean keeps the picture as bright as it was.")
+def summed(measured):
+    return 4 * binned(measured)
+
+
+@BINNED.wrong("You keep one pixel of four and drop the others. Their mean scatters less.")
+def one_of_four(measured):
+    return measured[::2, ::2]
+
+
+@BINNED.wrong("You take the mean of two pixels in a row only. Those below them have the same colour.")
+def binned_along_rows(measured):
+    return (measured[::2, ::2] + measured[::2, 1::2]) / 2
+
+
+@BINNED.wrong("You take the mean of two pixels in a column only. Those to their right have the same colour.")
+def binned_along_columns(measured):
+    return (measured[::2, ::2] + measured[1::2, ::2]) / 2
+
+
+@BINNED.wrong("You take the mean of two pixels on a diagonal. The other two have the same colour.")
+def binned_along_a_diagonal(measured):
+    return (measured[::2, ::2] + measured[1::2, 1::2]) / 2
+
+
+@BINNED.wrong(
+    "Your pixels are four apart: as if the tile were Bayer's, whose next red pixel is two away. Here the pixels of "
+    "one colour are neighbours, and each square of them becomes one."
+)
+def as_under_bayer(measured):
+    wrapped = np.pad(measured, ((0, 2), (0, 2)), mode="wrap")
+    return (wrapped[:-2:2, :-2:2] + wrapped[2::2, :-2:2] + wrapped[:-2:2, 2::2] + wrapped[2::2, 2::2]) / 4
+
+
+@BINNED.wrong("Your squares begin one pixel too far to the right and below. They mix the colours of four squares.")
+def squares_moved(measured):
+    return binned(np.roll(measured, (-1, -1), axis=(0, 1)))
+
+
+@BINNED.wrong("The answer has as many pixels as before. Each two by two become *one*: return the shape (h, w).")
+def size_kept(measured):
+    return np.repeat(np.repeat(binned(measured), 2, axis=0), 2, axis=1)
+
+
+@BINNED.wrong("You take the brightest of the four. It stands out by its noise: take the mean.")
+def brightest(measured):
+    return measured.reshape(len(measured) // 2, 2, -1, 2).max(axis=(1, 3))
+
+
+@BINNED.wrong("The middle two of four are a median. For counts of light the mean scatters less.")
+def median_of_four(measured):
+    return np.median(measured.reshape(len(measured) // 2, 2, -1, 2), axis=(1, 3))
+
+
+@BINNED.wrong(
+    "It is right where the answer lies between 0 and 1. Do not cut it off there: after the dark level is subtracted, "
+    "noise goes below 0."
+)
+def binned_and_cut_off(measured):
+    return np.clip(binned(measured), 0, 1)
+
+
+@BINNED.wrong("Rows and columns have changed places in what you return: the shape is (h, w), height first.")
+def binned_and_turned(measured):
+    return binned(measured).T
+
+
+# 5: green, with red's help -------------------------------------------------------------------------------------------
 
 
 def malvar_green(around: Array) -> Array:
@@ -553,7 +672,7 @@ def per_red_pixel(f):
     return 2 * false_frequency(f)
 
 
-# 4: look before you average ------------------------------------------------------------------------------------------
+# 6: look before you average ------------------------------------------------------------------------------------------
 
 
 def edge_green(around: Array) -> Array:
@@ -705,4 +824,4 @@ def one_decision_for_all(around):
     return column if down < across else (row + column) / 2
 
 
-EXERCISES = (MOSAIC, CROPPED_TILE, MALVAR_GREEN, FALSE_FREQUENCY, EDGE_GREEN)
+EXERCISES = (MOSAIC, FALSE_FREQUENCY, CROPPED_TILE, BINNED, MALVAR_GREEN, EDGE_GREEN)
