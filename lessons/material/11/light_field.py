@@ -228,17 +228,8 @@ class LightFieldView(RefocusedField):
     def _sensor_panel(self) -> str:
         down, across = self._window()
         x, y, width, _ = self._slot("sensor")
-        panel = Panel(
-            "sensor",
-            x,
-            y,
-            width,
-            0.75 * width,
-            across.start - 0.5,
-            across.stop - 0.5,
-            down.start - 0.5,
-            down.stop - 0.5,
-        )
+        edges = (across.start - 0.5, across.stop - 0.5, down.start - 0.5, down.stop - 0.5)
+        panel = Panel("sensor", x, y, width, 0.75 * width, *edges)
         seen = svg.image("sensor", 0, 0, panel.width, panel.height, style="image-rendering:pixelated")
         upright = [[(x - 0.5, panel.top), (x - 0.5, panel.bottom)] for x in range(across.start, across.stop)]
         level = [[(panel.left, y - 0.5), (panel.right, y - 0.5)] for y in range(down.start, down.stop)]
@@ -274,12 +265,8 @@ class LightFieldView(RefocusedField):
         if (left, right) == self.limits:
             return ""
         x = panel.place([(left, panel.top), (right, panel.top)])[:, 0]
-        words = (
-            svg.text((x.mean(), panel.height - 8), "exact: |d| ≤ 1 px", "note fill-ink middle")
-            if self.opening == 1
-            else ""
-        )
-        return svg.rectangle(x[0], 0, x[1] - x[0], panel.height, "wash fill-green") + words
+        words = svg.text((x.mean(), panel.height - 8), "exact: |d| ≤ 1 px", "note fill-ink middle")
+        return svg.rectangle(x[0], 0, x[1] - x[0], panel.height, "wash fill-green") + words * (self.opening == 1)
 
     def _numbers(self) -> str:
         x, y, _, _ = self._layout["numbers"]
