@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from camviz.draw import plot, svg
-from camviz.draw.flow import WIDTH, Cell, rows
+from camviz.draw.flow import WIDTH, Cell, rows, shortened
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg, png
 from camviz.draw.readout import listed, readout, signed
@@ -80,7 +80,8 @@ class LightFieldView(RefocusedField):
             if self._has(name) and sum(lines[-1].values()) + width > WIDTH:
                 lines.append({})
             lines[-1] |= {name: width} if self._has(name) else {}
-        return rows(*((_IMAGES if {"picture", "views"} & {*line} else _OTHERS, line) for line in lines))
+        cells = rows(*((_IMAGES if {"picture", "views"} & {*line} else _OTHERS, line) for line in lines))
+        return shortened(cells, rays=_OTHERS, sensor=_OTHERS, numbers=_OTHERS)
 
     def _slot(self, name: str) -> tuple[float, float, float, float]:
         """Where the panel of a cell stands: left, top, width and height."""
