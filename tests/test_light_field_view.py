@@ -187,7 +187,7 @@ def test_the_sky_is_infinitely_far_away_and_not_as_far_as_its_slope_is_rounded()
     assert LightFieldView(column=159).numbers()["in truth"].endswith(" px, ∞")
 
 
-WITH_YOURS = "picture slice depth yours"
+WITH_YOURS = "picture yours slice depth"
 
 
 def test_a_right_function_of_the_reader_s_makes_the_same_picture():
@@ -202,14 +202,39 @@ def test_a_wrong_one_makes_another_and_none_leaves_a_sentence():
         picture = LightFieldView(panels=WITH_YOURS, yours=known.function, slope=-1.24).figure(draft=True)
         assert picture.photographs.get("yours") != picture.photographs["picture"], known.explanation
     picture = LightFieldView(panels=WITH_YOURS, yours=lambda z, b, f, z_f: None).figure(draft=True)
-    assert "returns nothing yet" in picture.body
+    assert "yours appears here" in picture.body
+    assert "awaited" in picture.body  # the right picture, greyed
     assert "yours" not in picture.photographs
+    picture = LightFieldView(panels=WITH_YOURS, yours=lambda z, b, f, z_f: 1 / 0).figure(draft=True)
+    assert "ZeroDivisionError" in picture.body
 
 
 def test_few_panels_tell_only_their_own_figures():
-    views, slice_ = (LightFieldView(panels=panels).figure(draft=True) for panels in ("picture views", "picture slice"))
-    assert "slope at" not in views.body
-    assert "sensor" not in views.body + slice_.body
+    one, views, slice_ = (
+        LightFieldView(panels=panels).figure(draft=True) for panels in ("picture", "picture views", "picture slice")
+    )
+    assert "slope at" not in one.description + views.description
+    assert "sensor" not in one.description + slice_.description
+    assert "sensor" in views.description
+    assert "in truth" in slice_.description
+    assert {*one.photographs} == {"picture"}
     assert "slice" not in views.photographs
-    with pytest.raises(ValueError, match="panels must be one of"):
-        LightFieldView(panels="picture")
+
+
+def test_the_picture_says_how_far_away_it_is_sharp():
+    assert "Focused at 2.001 m" in LightFieldView(slope=3.25, panels="picture").figure(draft=True).body
+    unknown = LightFieldView.of(small(1, 3)).but(panels="picture").figure(draft=True).body
+    assert "Focused at" not in unknown
+
+
+@pytest.mark.parametrize("name", LightFieldView.openable)
+def test_buttons_open_each_panel_beside_the_picture(name):
+    opened = LightFieldView(panels="picture").with_panels({name: True})
+    assert opened.opened == (name,)
+    assert [tile.name for tile in opened.figure(draft=True).tiles] == ["picture", name]
+
+
+@pytest.mark.parametrize("bad", ["", "views", "picture fence"])
+def test_panels_that_there_are_not_are_refused(bad):
+    with pytest.raises(ValueError, match="panels must be picture and any of yours, views, slice"):
+        LightFieldView(panels=bad)

@@ -41,7 +41,7 @@ PICTURES = {
     "depth_of_field": DepthOfFieldView(),
     "fisheye": FisheyeView(panels="picture curves"),
     "image_sensor": ImageSensorView(),
-    "light_field": LightFieldView(),
+    "light_field": LightFieldView(slope=1.04, panels="picture slice"),
     "noise": PhotonTransferView(),
     "omnidirectional": OmnidirectionalView(panels="doughnut window", hfov_deg=80.0),
     "sharpness": SharpnessView(f_number=2.8, defocus_um=20.0),

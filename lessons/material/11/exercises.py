@@ -650,4 +650,126 @@ def focal_length_not_inverted(z, f, z_f):
     return (f - 1 / z_f) / (f - 1 / np.asarray(z))
 
 
-EXERCISES = (SUB_APERTURE, DISPARITY, REFOCUSED, ALPHA, SLOPE)
+# 6: patches of a focused plenoptic camera -----------------------------------------------------------------------------
+
+
+def patches(sensor: Array, n: int, m: int) -> Array:
+    """The middle m × m of the n × n pixels under each microlens, side by side. After Lumsdaine and Georgiev (2009)."""
+    height, width = sensor.shape[0] // n, sensor.shape[1] // n
+    first = (n - m) // 2
+    middle = sensor.reshape(height, n, width, n)[:, first : first + m, :, first : first + m]
+    return middle.reshape(height * m, width * m)
+
+
+def _patch_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for n, m, height, width in ((5, 3, 2, 3), (7, 3, 3, 2), (3, 1, 4, 2), (9, 5, 2, 4), (5, 5, 3, 2)):
+        yield rng.normal(0, 2, (n * height, n * width)), n, m
+
+
+PATCHES = Exercise(
+    name="11.patches",
+    reference=patches,
+    cases=_patch_cases,
+    hints=(
+        "Take one microlens first. Which of its n rows and columns of pixels are the middle m?",
+        "As many pixels are left out before the middle m as behind them. With four axes, (microlens, pixel, microlens, "
+        "pixel), one "
+        "slice cuts all microlenses at once: `sensor.reshape(height, n, width, n)`.",
+        "`middle = sensor.reshape(height, n, width, n)[:, ___, :, ___]`",
+    ),
+    praise="Each microlens gives m × m pixels now, where a view takes one.",
+)
+
+
+@PATCHES.right
+def microlens_after_microlens(sensor, n, m):
+    first = (n - m) // 2
+    picture = np.zeros((sensor.shape[0] // n * m, sensor.shape[1] // n * m))
+    for y, x in np.ndindex(sensor.shape[0] // n, sensor.shape[1] // n):
+        own = sensor[y * n : (y + 1) * n, x * n : (x + 1) * n]
+        picture[y * m : (y + 1) * m, x * m : (x + 1) * m] = own[first : first + m, first : first + m]
+    return picture
+
+
+@PATCHES.right
+def by_the_rows_and_columns_that_stay(sensor, n, m):
+    rows, columns = (np.flatnonzero(np.abs(np.arange(size) % n - n // 2) <= m // 2) for size in sensor.shape)
+    return sensor[np.ix_(rows, columns)]
+
+
+@PATCHES.right
+def from_views(sensor, n, m):
+    first = (n - m) // 2
+    picture = np.zeros((sensor.shape[0] // n * m, sensor.shape[1] // n * m))
+    for v, u in np.ndindex(m, m):
+        picture[v::m, u::m] = sensor[first + v :: n, first + u :: n]
+    return picture
+
+
+def _cut(sensor, n, m, first):
+    cells = sensor.reshape(sensor.shape[0] // n, n, sensor.shape[1] // n, n)
+    return cells[:, first : first + m, :, first : first + m]
+
+
+def _joined(cells):
+    a, b, c, d = cells.shape
+    return cells.reshape(a * b, c * d)
+
+
+@PATCHES.wrong(
+    "These are the first m × m pixels under each microlens. As many are left out before the middle as behind it."
+)
+def from_the_corner(sensor, n, m):
+    return _joined(_cut(sensor, n, m, 0))
+
+
+@PATCHES.wrong(
+    "These are the last m × m pixels under each microlens. As many are left out before the middle as behind it."
+)
+def from_the_last_corner(sensor, n, m):
+    return _joined(_cut(sensor, n, m, n - m))
+
+
+@PATCHES.wrong("The pixels are the right ones, but each patch is turned by half a turn. Lay them down as they stand.")
+def each_turned(sensor, n, m):
+    return _joined(patches(sensor, n, m).reshape(sensor.shape[0] // n, m, sensor.shape[1] // n, m)[:, ::-1, :, ::-1])
+
+
+@PATCHES.wrong("These are m × m whole *views* side by side. A patch is what lies under one microlens.")
+def views_side_by_side(sensor, n, m):
+    cells = _cut(sensor, n, m, (n - m) // 2).transpose(1, 0, 3, 2)
+    return _joined(cells)
+
+
+@PATCHES.wrong("The order of the axes is lost: patches are joined row by row only if their own rows stay in between.")
+def axes_lost(sensor, n, m):
+    cells = _cut(sensor, n, m, (n - m) // 2)
+    height, _, width, _ = cells.shape
+    return cells.transpose(0, 2, 1, 3).reshape(height * m, width * m)
+
+
+@PATCHES.wrong("This repeats the middle pixel of each microlens m × m times: larger, with no more detail.")
+def middle_pixel_repeated(sensor, n, m):
+    return np.kron(sensor[n // 2 :: n, n // 2 :: n], np.ones((m, m)))
+
+
+@PATCHES.wrong(
+    "This is the mean of each microlens's middle pixels: one pixel each. Lay all m × m of them side by side."
+)
+def mean_of_the_patch(sensor, n, m):
+    return _cut(sensor, n, m, (n - m) // 2).mean(axis=(1, 3))
+
+
+@PATCHES.wrong("This is the middle of the whole sensor. Every microlens has a middle of its own.")
+def middle_of_the_sensor(sensor, n, m):
+    height, width = sensor.shape[0] // n * m, sensor.shape[1] // n * m
+    top, left = (sensor.shape[0] - height) // 2, (sensor.shape[1] - width) // 2
+    return sensor[top : top + height, left : left + width]
+
+
+@PATCHES.wrong("Each patch is transposed: its rows lie where its columns belong.")
+def each_transposed(sensor, n, m):
+    return _joined(_cut(sensor, n, m, (n - m) // 2).transpose(0, 3, 2, 1))
+
+
+EXERCISES = (SUB_APERTURE, DISPARITY, REFOCUSED, ALPHA, SLOPE, PATCHES)

@@ -5,7 +5,7 @@ A reader's own slope of a depth can draw the line in the slice, the curve, and a
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 from functools import cached_property
@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from camviz.draw import plot, svg
-from camviz.draw.flow import Cell, rows
+from camviz.draw.flow import WIDTH, Cell, rows, shortened
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg, png
 from camviz.draw.readout import listed, readout, signed
@@ -23,28 +23,16 @@ from camviz.lenses.base import Array
 from camviz.lightfields import refocus, to_microlens_image
 from camviz.scenes import to_display
 from camviz.views.base import answered, step_of, without
+from camviz.views.depth_wedge import metres
 from camviz.views.marks import on_photograph, ring
 from camviz_school.views import garden_field, microlens_diagram
 from camviz_school.views.refocused_field import RefocusedField
 
-_ALL = "picture slice rays views sensor depth"
-_LAYOUTS = {  # by the panels there are
-    "picture views": rows((390, {"picture": 480, "views": 480}), (68, {"numbers": 300})),
-    "picture slice": rows((390, {"picture": 480, "slice": 480}), (92, {"numbers": 300})),
-    _ALL: rows(
-        (390, {"picture": 480, "views": 480}),
-        (214, {"slice": 480, "rays": 480}),
-        (220, {"depth": 400, "sensor": 200, "numbers": 180, "light field": 180}),
-    ),
-    "picture slice depth yours": rows(
-        (390, {"picture": 480, "yours": 480}), (230, {"slice": 480, "depth": 480}), (92, {"numbers": 300})
-    ),
-}
-_TOLD = {  # the figures that few panels speak of
-    "picture views": ("focused at", "views summed"),
-    "picture slice": ("focused at", "slope at the mark", "in truth"),
-    "picture slice depth yours": ("focused at", "slope at the mark"),
-}
+_WIDE = {
+    "picture": 400, "yours": 400, "views": 400, "slice": 480, "rays": 480, "depth": 400, "sensor": 220, "numbers": 330
+}  # fmt: skip
+"""The panels in their order, and how wide each is in picture units."""
+_IMAGES, _OTHERS = 332, 224  # the height of a row with pictures, and of one without
 _STEEPEST = 40.0  # pixels a view: a shear beyond it leaves the picture
 
 
@@ -52,23 +40,48 @@ _STEEPEST = 40.0  # pixels a view: a shear beyond it leaves the picture
 class LightFieldView(RefocusedField):
     """A light field, drawn: the picture focused at a slope, all views, the slice, the rays, the sensor and the depths.
 
-    `panels` names what is drawn: "picture views", "picture slice", "picture slice depth yours" or all. `yours` is a
-    reader's function of (z, b, f, z_f), depths (...) to slopes (...); what it does is orange.
+    `panels` names what is drawn: the picture, and any of yours, views, slice, rays, depth, sensor and numbers beside
+    it. `yours` is a reader's function of (z, b, f, z_f), depths (...) to slopes (...); what it does is orange.
     """
 
     title: ClassVar[str] = "Light field"
-    layouts = _LAYOUTS
+    openable: ClassVar[Mapping[str, str]] = {
+        "views": "views",
+        "slice": "slice",
+        "depth": "slope and depth",
+        "rays": "rays",
+        "sensor": "sensor",
+        "numbers": "numbers",
+    }
 
-    panels: str = _ALL
+    panels: str = "picture views slice rays depth sensor numbers"
     yours: Callable[..., Any] | None = dataclass_field(default=None, compare=False, repr=False)
 
-    def _told(self) -> dict[str, str]:
-        figures = self.numbers()
-        return {name: figures[name] for name in _TOLD.get(self.panels, figures) if name in figures}
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        wanted = self.panels.split()
+        if "picture" not in wanted or not set(wanted) <= {*_WIDE}:
+            others = ", ".join(list(_WIDE)[1:])
+            raise ValueError(f"panels must be picture and any of {others} beside it, got {self.panels!r}")
 
-    @property
+    def _told(self) -> dict[str, str]:
+        """The figures that the panels speak of."""
+        slopes, lens, pixels = "slice depth numbers", "rays numbers", "views sensor numbers"
+        spoken = {"slope": slopes, "in": slopes, "α": lens, "a": lens, "sensor": pixels, "each": pixels}  # first words
+        named = ((name, spoken.get(name.split()[0], "picture")) for name in self.numbers())
+        told = {name for name, by in named if any(map(self._has, by.split()))}
+        return {name: figure for name, figure in self.numbers().items() if name in told}
+
+    @cached_property
     def _layout(self) -> dict[str, Cell]:
-        return _LAYOUTS[self.panels]
+        """As many panels in a row as it has room for, in their order."""
+        lines: list[dict[str, float]] = [{}]
+        for name, width in _WIDE.items():
+            if self._has(name) and sum(lines[-1].values()) + width > WIDTH:
+                lines.append({})
+            lines[-1] |= {name: width} if self._has(name) else {}
+        cells = rows(*((_IMAGES if {"picture", "views"} & {*line} else _OTHERS, line) for line in lines))
+        return shortened(cells, rays=_OTHERS, sensor=_OTHERS, numbers=_OTHERS)
 
     def _slot(self, name: str) -> tuple[float, float, float, float]:
         """Where the panel of a cell stands: left, top, width and height."""
@@ -91,24 +104,27 @@ class LightFieldView(RefocusedField):
 
     def figure(self, *, draft: bool = False) -> Picture:
         attached: dict[str, bytes] = {}
-        parts = {"picture": self._picture_panel(attached)} | self._numbers()
+        parts = {"picture": self._picture_panel(attached)}
         if self._has("slice"):
             attached["slice"] = png(_bytes(self.light_field.views[self.v, :, self._slice_row]))
-            parts["slice"] = self._slice_panel()
         if self._has("rays"):
             x, y, _, _ = self._slot("rays")
             given = (self.slope_here, self.slope, self.mask[self.v], self.u, self.opening)
             parts["rays"] = microlens_diagram.drawn(x + 10, y, *given)
         if self._has("views"):
             attached["views"] = garden_field.all_views(self.light_field)
-            parts["views"] = self._views_panel()
         if self._has("sensor"):
             attached["sensor"] = png(self._under_the_microlenses())
-            parts["sensor"] = self._sensor_panel()
-        if self._has("depth"):
-            parts["depth"] = self._depth_panel()
         if self._has("yours"):
             parts["yours"] = self._your_panel(attached)
+        plain = {
+            "slice": self._slice_panel,
+            "views": self._views_panel,
+            "sensor": self._sensor_panel,
+            "depth": self._depth_panel,
+            "numbers": self._numbers,
+        }
+        parts |= {name: draw() for name, draw in plain.items() if self._has(name)}
         return self.tiled(self._layout, {name: parts[name] for name in self._layout}, attached)
 
     # The picture and its slice ---------------------------------------------------------------------------------------
@@ -136,8 +152,13 @@ class LightFieldView(RefocusedField):
             low, high = self.limits
             return heat_panel(panel, width, height, low, high, "px", marks, title=title, **heading)
         attached["picture"] = jpeg(self.image(), quality=90)
-        title = "One view" if self.aperture == "pinhole" else f"Refocused: shear by {signed(self.slope, 2)} px, sum"
+        title = "One view" if self.aperture == "pinhole" else self._focus
         return panel.show(placed_image(panel, "picture", width, height) + marks, title=title, **heading)
+
+    @property
+    def _focus(self) -> str:
+        far = float(self.light_field.depth(self.slope))
+        return f"Focused at {metres(far)}" if far > 0 else "Focused by the slope"
 
     def _row_handle(self, left_end: Array) -> str:
         grip = svg.rectangle(left_end[0], left_end[1] - 9, 16, 18, "paper half") + svg.polygon(
@@ -155,7 +176,6 @@ class LightFieldView(RefocusedField):
     def _slice_panel(self) -> str:
         width, columns = self.views.shape[3], self.views.shape[1]
         x, y, across, height = self._slot("slice")
-        across = min(across, self._image_panel.width)
         panel = Panel("slice", x, y, across, height, -0.5, width - 0.5, -0.5, columns - 0.5)
         seen = svg.image("slice", 0, 0, panel.width, panel.height, style="image-rendering:pixelated")
         u = np.array([-0.5, columns - 0.5])
@@ -209,17 +229,8 @@ class LightFieldView(RefocusedField):
     def _sensor_panel(self) -> str:
         down, across = self._window()
         x, y, width, _ = self._slot("sensor")
-        panel = Panel(
-            "sensor",
-            x,
-            y,
-            width,
-            0.75 * width,
-            across.start - 0.5,
-            across.stop - 0.5,
-            down.start - 0.5,
-            down.stop - 0.5,
-        )
+        edges = (across.start - 0.5, across.stop - 0.5, down.start - 0.5, down.stop - 0.5)
+        panel = Panel("sensor", x, y, width, 0.75 * width, *edges)
         seen = svg.image("sensor", 0, 0, panel.width, panel.height, style="image-rendering:pixelated")
         upright = [[(x - 0.5, panel.top), (x - 0.5, panel.bottom)] for x in range(across.start, across.stop)]
         level = [[(panel.left, y - 0.5), (panel.right, y - 0.5)] for y in range(down.start, down.stop)]
@@ -255,33 +266,13 @@ class LightFieldView(RefocusedField):
         if (left, right) == self.limits:
             return ""
         x = panel.place([(left, panel.top), (right, panel.top)])[:, 0]
-        words = (
-            svg.text((x.mean(), panel.height - 8), "exact: |d| ≤ 1 px", "note fill-ink middle")
-            if self.opening == 1
-            else ""
-        )
-        return svg.rectangle(x[0], 0, x[1] - x[0], panel.height, "wash fill-green") + words
+        words = svg.text((x.mean(), panel.height - 8), "exact: |d| ≤ 1 px", "note fill-ink middle")
+        return svg.rectangle(x[0], 0, x[1] - x[0], panel.height, "wash fill-green") + words * (self.opening == 1)
 
-    def _numbers(self) -> dict[str, str]:
-        """The tiles of figures: one of few, or two of all."""
-        figures = self._told()
+    def _numbers(self) -> str:
         x, y, _, _ = self._layout["numbers"]
-        if self.panels == _ALL:
-            names, far = list(figures), self._layout["light field"][0] + 10
-            first, second = ({name: figures[name] for name in part} for part in (names[:4], names[4:]))
-            column: tuple[Any, ...] = (0, 38), (0, 17)
-            return {
-                "numbers": svg.text((x + 10, y + 26), "This picture", "title")
-                + readout(first, (x + 10, y + 50), *column),
-                "light field": svg.text((far, y + 26), "Its light field", "title")
-                + readout(second, (far, y + 50), *column),
-            }
-        rows = readout(figures, (x + 10, y + 20), (0, 24), (145, 0))
-        if self.yours:
-            own = f"{signed(self._your_slope, 2)} px" if np.isfinite(self._your_slope) else "–"
-            at = (x + 10, y + 20 + 24 * len(figures))
-            rows += readout({"your slope for this depth": own}, at, (0, 0), (210, 0), "orange")
-        return {"numbers": rows}
+        heading = svg.text((x + 10, y + 26), "This picture, and its light field", "title")
+        return heading + readout(self._told(), (x + 10, y + 52), (0, 21), (145, 0))
 
     # The reader's own function ---------------------------------------------------------------------------------------
 
@@ -315,7 +306,8 @@ class LightFieldView(RefocusedField):
             steep = f"{signed(slope, 2)} px a view: so steep a shear leaves the picture."
             problem = f"Your slope for this depth is {steep if np.isfinite(slope) else 'not a finite number.'}"
         if problem:
-            return without(panel, problem, "Focused by your slope")
+            right = placed_image(panel, "picture", width, height)
+            return without(panel, problem, "Focused by your slope", right=right)
         attached["yours"] = jpeg(to_display(refocus(self.light_field, slope, self.mask)), quality=90)
         note = f"sheared by {signed(slope, 2)} px"
         return panel.show(placed_image(panel, "yours", width, height), title="Focused by your slope", note=note)
