@@ -25,7 +25,7 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x]\n" + "".join(
 def page(monkeypatch):
     """A page writer that can be watched, in place of the real one."""
     writer = types.ModuleType("camviz_clinic.report.page")
-    writer.write_page = lambda calibration, path: Path(path).write_text(f"page of {calibration.source.name}")
+    writer.write_page = lambda said, path: Path(path).write_text(f"page of {said.calibration.source.name}")
     monkeypatch.setitem(sys.modules, "camviz_clinic.report.page", writer)
     return writer
 

@@ -11,8 +11,9 @@ from typing import Any
 from camviz_clinic.commands.common import OK, Refusal, add_command, loaded, narrator, refuse_output, size, write_whole
 
 SHOW = """\
-Writes one HTML page that shows the cameras of a calibration: where they stand and what they see, how their lenses
-bend straight lines, and how their pictures are tied together. The page holds everything it needs and opens offline.
+Writes one HTML page that shows the cameras of a calibration: what `camviz inspect` says of them, where they stand and
+what they see, how their lenses bend straight lines, and how their pictures are tied together. The page holds
+everything it needs and opens offline.
 
 Reads the formats below; the content of the file tells which it is. The file is only read: nothing in it is run, and it
 is not changed.
@@ -39,10 +40,13 @@ def show(options: argparse.Namespace) -> int:
     calibration = loaded(options.file, options.size)
     output = options.output or Path(options.file.stem + ".html")
     refuse_output(output, "page", options.file)
+    from camviz_clinic.checks import inspect
     from camviz_clinic.report.page import write_page
 
-    write_whole(output, lambda path: write_page(calibration, path))
+    inspection = inspect(calibration)
+    write_whole(output, lambda path: write_page(inspection, path))
     told = narrator(output)
+    told(inspection.verdict)
     for note in calibration.notes:
         told(note)
     told(f"{output}: open it in a browser.")

@@ -17,6 +17,11 @@ _HEALTHY = "#00785a"
 
 def verdict_html(inspection: Inspection) -> str:
     """The likely cause and what to do in one line, what shows it in another, and the calibration at a glance."""
+    return said_html(inspection) + (glance_html(inspection.summary) if inspection.summary else "")
+
+
+def said_html(inspection: Inspection) -> str:
+    """The likely cause and what to do in one line, and what shows it in another."""
     worst = words.worst_of(inspection.findings)
     colour = _COLOURS[worst.severity] if worst else _HEALTHY
     said = f'<p class="verdict" style="border-left:5px solid {colour};padding-left:.9em">'
@@ -24,7 +29,7 @@ def verdict_html(inspection: Inspection) -> str:
     said += f"<br>{escape(words.claim(inspection.findings))}" if worst else ""
     said += f"<br><b>Next:</b> {escape(inspection.next_step)}" if inspection.next_step else ""
     compared = "".join(f"<p>{escape(each.sentence)}</p>" for each in inspection.differences)
-    return compared + said + "</p>" + (glance_html(inspection.summary) if inspection.summary else "")
+    return f"{compared}{said}</p>"
 
 
 def glance_html(summary: Summary) -> str:

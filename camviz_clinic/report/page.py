@@ -1,4 +1,4 @@
-"""One calibration as one HTML page: the three visualizers, with everything inside, readable without a network."""
+"""One calibration as one HTML page: its verdict and the three visualizers, all inside, readable without a network."""
 
 from __future__ import annotations
 
@@ -11,26 +11,37 @@ from pathlib import Path
 import numpy as np
 
 from camviz.cameras import Camera
+from camviz.distortion import fold_angle
 from camviz.draw.page import document, figure
 from camviz.lenses import Lens
 from camviz.poses import RigidTransform
 from camviz.views.distortion import DistortionView
 from camviz.views.epipolar import EpipolarView
 from camviz.views.frustum import FrustumView
+from camviz_clinic.checks.inspection import Inspection
 from camviz_clinic.files import Calibration
+from camviz_clinic.report.findings import said_html
 
 SIDE_STEP = 0.1  # metres: how far a lone camera is moved to give it a partner
 
 
-def write_page(calibration: Calibration, path: str | Path) -> None:
-    """Write the page of a calibration to `path`."""
-    Path(path).write_text(page(calibration), encoding="utf-8")
+def write_page(inspection: Inspection, path: str | Path) -> None:
+    """Write the page of an inspection's calibration to `path`."""
+    Path(path).write_text(page(inspection), encoding="utf-8")
 
 
-def page(calibration: Calibration) -> str:
-    """The page as HTML text: the cameras' numbers, then their frusta, their distortion and their epipolar geometry."""
+def page(inspection: Inspection) -> str:
+    """The page as HTML text: what the inspection says, the cameras' numbers, their frusta, distortion and epipoles.
+
+    Raises: ValueError for the inspection of a file that could not be read.
+    """
+    calibration = inspection.calibration
+    if calibration is None:
+        raise ValueError("a page shows a calibration, and this inspection has none")
+    more = f"<p><code>camviz inspect {escape(calibration.source.name)}</code> says what was checked.</p>"
     sections = [numbers_table(calibration), *_frusta(calibration), *_distortions(calibration), *_epipolar(calibration)]
-    return document(calibration.source.name, f"<p>{escape(calibration.format)}</p>{''.join(sections)}")
+    said = f"{said_html(inspection)}{more}<p>{escape(calibration.format)}</p>"
+    return document(calibration.source.name, f"{said}{''.join(sections)}")
 
 
 def numbers_table(calibration: Calibration) -> str:
@@ -66,12 +77,26 @@ def _frusta(calibration: Calibration) -> Iterator[str]:
 
 
 def _distortions(calibration: Calibration) -> Iterator[str]:
-    yield (
-        "<h2>What the lens does</h2><p>A red circle marks where the model folds: rays beyond it land where others "
-        "already are, and pixels beyond it have no ray at all.</p>"
-    )
+    yield "<h2>What the lens does</h2>"
+    if any(map(_fold_in_sight, calibration.cameras.values())):
+        yield (
+            "<p>A red circle marks where the model folds: rays beyond it land where others already are, and pixels "
+            "beyond it have no ray at all.</p>"
+        )
     for name, camera in calibration.cameras.items():
         yield figure(name, DistortionView.of(camera).figure())
+
+
+def _fold_in_sight(camera: Camera) -> bool:
+    """Whether the circle lies in the picture, bent by the lens or among ideal points: the last rays before the fold."""
+    angle = fold_angle(camera.lens) * (1 - 1e-6)
+    if not np.isfinite(angle):
+        return False
+    turn = np.linspace(0, 2 * np.pi, 90)
+    around = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    rays = np.hstack([np.sin(angle) * around, np.full((90, 1), np.cos(angle))])
+    places = [camera.lens.project(rays)] + [np.tan(angle) * around] * (angle < np.pi / 2)
+    return bool(camera.intrinsics.contains(camera.intrinsics.to_pixels(np.concatenate(places))).any())
 
 
 def _epipolar(calibration: Calibration) -> Iterator[str]:
