@@ -12,9 +12,9 @@ from calibrations import bare, pair, sick, single
 
 import camviz_clinic
 from camviz_clinic.checks import Inspection, inspect, inspect_file, kinds
-from camviz_clinic.report.inspection import MOST_VIEWS, report, write_report
+from camviz_clinic.report.inspection import MOST_VIEWS, accused, report, worst_views, write_report
 from camviz_clinic.report.notebook import LiveInspection
-from camviz_clinic.views.catalogue import ALIASES, VIEWS
+from camviz_clinic.views.catalogue import ALIASES, VIEWS, Case
 
 VOID = {"meta", "br", "img", "link", "input", "hr"}
 
@@ -93,7 +93,7 @@ def test_the_bars_pictures_and_boards_of_a_view_share_its_number():
     boards = set(re.findall(r'data-choose="(\d+)" class="board"', text))
     figures = set(re.findall(r'<figure id="of-camera-\d+" data-view="(\d+)"', text))
     assert bars == boards == figures == {str(i + 1) for i in range(10)}
-    assert 'data-worst="4"' in text
+    assert 'data-first="4"' in text
 
 
 def test_photographs_are_embedded_small(tmp_path):
@@ -126,11 +126,26 @@ def test_of_many_views_the_worst_are_shown_and_the_page_says_so():
     poses = type(few.cam_from_board["camera"]).concatenate([few.cam_from_board["camera"]] * 50)
     many = replace(few, detections={"camera": uv}, cam_from_board={"camera": poses}, pictures={}, per_view_errors={})
     text = report(Inspection(many, (), ()))
-    assert f"Of the 500 views the {MOST_VIEWS} worst are shown." in text
+    assert f"Of the 500 views {MOST_VIEWS} are shown: those that a finding names, and the worst." in text
     assert text.count("<figure id=") == MOST_VIEWS
     assert 'id="of-camera-10"' in text
     assert len(text) < 5e6
     parsed(text)
+    named = worst_views(Case(many).observations("camera"), [300])
+    assert {9, 300} < set(named)
+    assert len(named) == MOST_VIEWS
+
+
+def test_the_report_opens_at_what_the_gravest_finding_is_about():
+    """The worst view of `sick` is the fourth; a fault about the second comes before a warning about the third."""
+    calibration = sick()
+    kind = kinds()["outlier-view"]
+    first = kind.found("a", 1.0, "px", "camera", pictures=(1, 5), severity="fault")
+    other = kind.found("b", 1.0, "px", "camera", pictures=(2,), severity="warning")
+    assert accused(Inspection(calibration, (first, other), ()), "camera") == [1, 5, 2]
+    assert accused(Inspection(calibration, (first,), ()), "another") == []
+    assert 'data-first="2"' in report(Inspection(calibration, (first, other), ()))
+    assert 'data-first="4"' in report(Inspection(calibration, (), ()))
 
 
 def test_a_file_that_cannot_be_read_gets_its_finding_and_no_views(tmp_path):

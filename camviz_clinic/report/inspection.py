@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from os import PathLike
@@ -59,7 +59,7 @@ def report(inspection: Inspection, *, images: Folders | None = None) -> str:
     sections: list[tuple[Entry, str]] = []
     missing: dict[str, str] = {}
     for entry in VIEWS.values():
-        shown, why = _section(case, entry)
+        shown, why = _section(case, entry, inspection)
         sections += [(entry, shown)] if shown else []
         missing |= {entry.name: why} if why else {}
     contents = "".join(f'<a href="#view-{entry.name}">{escape(entry.title)}</a> ' for entry, _ in sections)
@@ -95,14 +95,14 @@ def _see(inspection: Inspection, finding: Finding) -> str:
     return f"→ {', '.join(links)}"
 
 
-def _section(case: Case, entry: Entry) -> tuple[str, str]:
+def _section(case: Case, entry: Entry, inspection: Inspection) -> tuple[str, str]:
     """One view's section, of each camera where it is of one; or "" and why there is none."""
     cameras = ("",) if entry.of_all else case.names[:MOST_CAMERAS]
     shown, why = "", ""
     for name in cameras:
         view = entry.view(case, name)
         if isinstance(view, ResidualsView):
-            shown += _linked(case, name, len(cameras) > 1)
+            shown += _linked(case, name, len(cameras) > 1, accused(inspection, name))
         elif isinstance(view, MissingView):
             why = view.sentence
         else:
@@ -132,10 +132,21 @@ def _missing(missing: Mapping[str, str]) -> str:
 # A bar → its picture → its board -------------------------------------------------------------------------------------
 
 
-def _linked(case: Case, name: str, headed: bool) -> str:
-    """The bars of all views, and of the worst ones their pictures and boards, linked through `data-choose`."""
+def accused(inspection: Inspection, name: str) -> list[int]:
+    """The views (from 0) of a camera that findings are about, those of the gravest finding first."""
+    cameras = inspection.calibration.cameras if inspection.calibration else {}
+    alone = next(iter(cameras), "")
+    return [view for finding in inspection.findings if (finding.camera or alone) == name for view in finding.pictures]
+
+
+def _linked(case: Case, name: str, headed: bool, named: Sequence[int]) -> str:
+    """The bars of all views, and of those `named` and the worst their pictures and boards, linked by `data-choose`.
+
+    The first of those named is chosen at first, or the worst.
+    """
     seen = case.observations(name)
-    shown = worst_views(seen)
+    shown = worst_views(seen, named)
+    first = next((view for view in named if view in shown), seen.worst)
     view = ResidualsView.about(seen)
     links = {i: f"#{_id(name)}-{i + 1}" for i in shown}
     panel = bars_panel(seen)
@@ -143,22 +154,23 @@ def _linked(case: Case, name: str, headed: bool) -> str:
         view.bars_panel(panel, links=links), 960, 206,
         f"Error of every view of {name}", view.description().split(" Shown:")[0],
     )  # fmt: skip
-    few = f"<p>Of the {len(seen)} views the {len(shown)} worst are shown.</p>" if len(shown) < seen.shown.sum() else ""
+    which = f"<p>Of the {len(seen)} views {len(shown)} are shown: those that a finding names, and the worst.</p>"
+    few = which if len(shown) < seen.shown.sum() else ""
     said = f'{few}<p class="live-only">Choose a bar, or a board in space, or press the arrow keys on one.</p>'
     figures = "".join(_view_figure(view.but(view=i + 1), name, i) for i in shown)
     heading = f"<h3>{escape(name)}</h3>" if headed else ""
     return (
-        f'<div class="linked" data-worst="{seen.worst + 1}">{heading}{said}{_picture(bars)}'
+        f'<div class="linked" data-first="{first + 1}">{heading}{said}{_picture(bars)}'
         '<div class="side-by-side"><div '
         f'class="pictures">{figures}</div>{_picture(_boards(seen, name, links))}</div></div>'
     )
 
 
-def worst_views(seen: Observations) -> list[int]:
-    """The views (from 0) whose pictures a page holds, in their order: all of them, or the worst."""
+def worst_views(seen: Observations, named: Sequence[int] = ()) -> list[int]:
+    """The views (from 0) whose pictures a page holds, in their order: all of them, or those `named` and the worst."""
     errors = np.nan_to_num(seen.rms_seen, nan=-1)
-    worst = [i for i in np.argsort(-errors, kind="stable").tolist() if seen.shown[i]]
-    return sorted(worst[:MOST_VIEWS])
+    ranked = dict.fromkeys([*named, *np.argsort(-errors, kind="stable").tolist()])
+    return sorted([i for i in ranked if i < len(seen) and seen.shown[i]][:MOST_VIEWS])
 
 
 def _view_figure(view: ResidualsView, name: str, i: int) -> str:

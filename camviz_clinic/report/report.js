@@ -38,6 +38,6 @@ for (const linked of document.querySelectorAll(".linked")) {
   };
   addEventListener("hashchange", follow);
   linked.classList.add("live");
-  choose(shown.includes(linked.dataset.worst) ? linked.dataset.worst : shown[0]);
+  choose(shown.includes(linked.dataset.first) ? linked.dataset.first : shown[0]);
   follow();
 }

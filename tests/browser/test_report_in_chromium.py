@@ -124,6 +124,6 @@ def test_each_camera_of_a_pair_has_its_own_choice(browser, written):
     left, right = page.locator(".linked").all()
     left.locator("a[data-choose='3']:not(.board) rect").click()
     assert left.get_attribute("data-chosen") == "3"
-    assert right.get_attribute("data-chosen") != "3" or right.get_attribute("data-worst") == "3"
+    assert right.get_attribute("data-chosen") != "3" or right.get_attribute("data-first") == "3"
     assert complaints == []
     page.close()
