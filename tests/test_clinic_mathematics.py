@@ -75,6 +75,7 @@ def test_corners_held_out_of_a_healthy_set_are_off_as_foretold(folds) -> None:
     assert np.mean([one.rms / one.expected_rms for one in found]) == pytest.approx(1, abs=0.07)
 
 
+@pytest.mark.thorough
 def test_what_a_camera_of_few_views_foretells_is_as_uncertain_as_was_said() -> None:
     """Cameras of four views asked of the fifth, 8 sets: most of the error is the camera's, and it is as foretold."""
     rng = np.random.default_rng(15)
@@ -96,6 +97,7 @@ def test_corners_held_out_show_what_poses_have_made_up_for() -> None:
 # A bent board ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.thorough
 def test_flat_boards_are_called_bent_no_oftener_than_was_said() -> None:
     """60 flat boards: the probabilities are uniform; at a rate of 5 % there are at most 9 false alarms (99.9 %)."""
     rng = np.random.default_rng(5)
@@ -143,6 +145,7 @@ def test_after_parallel_boards_a_tilted_one_is_asked_for(parallel) -> None:
     assert np.allclose([best.tilt_deg, worst.tilt_deg], tilt_deg(both, BOARD))
 
 
+@pytest.mark.thorough
 def test_what_is_foretold_of_a_board_is_what_its_picture_brings(parallel) -> None:
     """With the corners of the best and of the worst candidate added and solved anew 15 times, the camera's difference
     from the truth is as much smaller as was said: the best is better than the worst, and by how much to 40 %."""

@@ -154,6 +154,7 @@ print(abs(x - sin(0.35 * pi) / 0.7) < 1e-15)
     assert held(made, "tests/test_lenses.py", "sine_fisheye or SineFisheye") > 20
 
 
+@pytest.mark.thorough
 def test_a_calibration_format_is_one_file(tmp_path):
     made = added(tmp_path, "camviz_clinic/files/")
     (made.root / "a.toy").write_text("toy 640 480 500 321.25 239.5\n")
