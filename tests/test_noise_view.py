@@ -177,7 +177,7 @@ def test_each_panel_opens_and_closes_and_is_drawn_alone():
     assert "on the card" in opened.description()
     assert "gain K" not in opened.description()
     for wrong in ("", "picture lines"):
-        with pytest.raises(ValueError, match="panels must be any of picture, curve, histogram, figures"):
+        with pytest.raises(ValueError, match="panels must be one or more of picture, curve, histogram, figures"):
             PhotonTransferView(panels=wrong)
 
 

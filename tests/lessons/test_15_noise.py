@@ -82,7 +82,7 @@ def test_a_perfect_camera_s_picture_is_grainy(says):
         exposure=-8.0, bits=14, prnu=0.0, dsnu_e=0.0, dark_current=0.0, read_noise_e=0.0, panels="picture"
     )
     assert part == 1 / perfect.exposure_s
-    says("the electronics of this camera add next to nothing")
+    says("there the electronics of this camera add next to nothing.")
     assert (1 / 12) ** 0.5 / perfect.sensor.gain_dn_per_e < 0.1 * np.sqrt(dim)  # what is left of them is rounding
     says("It is still grainy, and a perfect camera could do no better.")
     counts = np.random.default_rng(1).poisson(dim, 100_000)

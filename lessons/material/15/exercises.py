@@ -414,7 +414,115 @@ def dead_only_where_equal(frame, dark, flat):
     return (frame - dark) * np.nanmean(answer) / answer
 
 
-# 4: merge a bracket ---------------------------------------------------------------------------------------------------
+# 4: find the bug in the decibels --------------------------------------------------------------------------------------
+
+
+def dynamic_range_db(saturation: Array, dark_noise: Array) -> Array:
+    """20 log10 of saturation over the threshold σ_d + ½, all in electrons (...)."""
+    return 20 * np.log10(saturation / (dark_noise + 0.5))
+
+
+def dynamic_range_as_given(saturation, dark_noise):
+    return 20 * np.log(saturation / (dark_noise + 0.5))
+
+
+def _decibel_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for shape in SHAPES:
+        yield (rng.uniform(3_000, 90_000, shape), rng.uniform(2, 30, shape))
+    noise = rng.uniform(2, 30, 3)
+    yield (np.array([0.1, 1, 1000]) * (noise + 0.5), noise)  # below the threshold, at it, and 60 dB above
+    yield (np.array([3000.0, 9000.0]), np.array([0.0, 0.7]))  # without any noise the threshold is ½
+
+
+DECIBELS = Exercise(
+    name="15.dynamic_range_db",
+    reference=dynamic_range_db,
+    cases=_decibel_cases,
+    as_given=dynamic_range_as_given,
+    shown=((13_973.0, 10.95),),
+    hints=(
+        "Put in a ratio whose decibels you know: saturation 1000 times the threshold is 60 dB. What comes out?",
+        "Every answer is too large by one and the same factor. Which logarithm has that value, and which base "
+        "does the decibel want?",
+        "`return 20 * np.___(saturation / (dark_noise + 0.5))`",
+    ),
+    praise="Common logarithms. The published result file of a reference data set has this very bug in it.",
+)
+
+
+@DECIBELS.right
+def levels_subtracted(saturation, dark_noise):
+    return 20 * (np.log10(saturation) - np.log10(dark_noise + 0.5))
+
+
+@DECIBELS.right
+def natural_over_ln_10(saturation, dark_noise):
+    return 20 * np.log(saturation / (dark_noise + 0.5)) / np.log(10)
+
+
+@DECIBELS.right
+def as_a_ratio_of_powers(saturation, dark_noise):
+    return 10 * np.log10((saturation / (dark_noise + 0.5)) ** 2)
+
+
+@DECIBELS.wrong("Ten is for ratios of power. EMVA 1288 counts a ratio of signals, with 20.")
+def ten_for_twenty(saturation, dark_noise):
+    return 10 * np.log10(saturation / (dark_noise + 0.5))
+
+
+@DECIBELS.wrong("You halved the 20 and left the logarithm as it was. The answers are smaller now, and no more right.")
+def ten_with_the_natural_logarithm(saturation, dark_noise):
+    return 10 * np.log(saturation / (dark_noise + 0.5))
+
+
+@DECIBELS.wrong("This is the exponent of ten, in bels of signal. A decibel is a twentieth of it: keep the 20.")
+def without_the_twenty(saturation, dark_noise):
+    return np.log10(saturation / (dark_noise + 0.5))
+
+
+@DECIBELS.wrong("With log2 you count stops (bits), here twenty times. Decibels take the common logarithm.")
+def twenty_times_stops(saturation, dark_noise):
+    return 20 * np.log2(saturation / (dark_noise + 0.5))
+
+
+@DECIBELS.wrong("These are stops: how often the signal can be halved. The question is in decibels.")
+def stops(saturation, dark_noise):
+    return np.log2(saturation / (dark_noise + 0.5))
+
+
+@DECIBELS.wrong("The logarithm is right. But the threshold, where signal equals noise, is σ_d + ½: keep the ½.")
+def over_the_noise(saturation, dark_noise):
+    return 20 * np.log10(saturation / dark_noise)
+
+
+@DECIBELS.wrong(
+    "That is the exact threshold, ½ + √(σ² + ¼). It is better physics, but the file that is to be mended took σ_d + ½."
+)
+def over_the_exact_threshold(saturation, dark_noise):
+    return 20 * np.log10(saturation / (0.5 + np.sqrt(dark_noise**2 + 0.25)))
+
+
+@DECIBELS.wrong("Without its brackets the ½ is added to the *ratio*: `a / b + 0.5` divides first.")
+def half_added_to_the_ratio(saturation, dark_noise):
+    return 20 * np.log10(saturation / dark_noise + 0.5)
+
+
+@DECIBELS.wrong("The ratio is upside down: it says by how much the threshold lies *below* saturation.")
+def upside_down(saturation, dark_noise):
+    return 20 * np.log10((dark_noise + 0.5) / saturation)
+
+
+@DECIBELS.wrong("A quotient of two logarithms is a logarithm to another base. The logarithm of a quotient is meant.")
+def quotient_of_logarithms(saturation, dark_noise):
+    return 20 * np.log10(saturation) / np.log10(dark_noise + 0.5)
+
+
+@DECIBELS.wrong("You *multiplied* by ln 10. The natural logarithm is too large by that factor already: divide.")
+def multiplied_by_ln_10(saturation, dark_noise):
+    return 20 * np.log(saturation / (dark_noise + 0.5)) * np.log(10)
+
+
+# 5: merge a bracket ---------------------------------------------------------------------------------------------------
 
 
 def merge(electrons: Array, exposures: Array, dark_noise: float, full_well: float) -> Array:
@@ -630,219 +738,7 @@ def the_longest_alone(electrons, exposures, dark_noise, full_well):
     return np.where(usable.any(axis=0), best, np.nan)
 
 
-# 5: the least light that can be measured ------------------------------------------------------------------------------
-
-
-def threshold_photons(dark_noise: Array, efficiency: float) -> Array:
-    """Photons (...) whose signal equals its noise: the positive root of μ² = σ_d² + μ, over the quantum efficiency."""
-    electrons = 0.5 + np.sqrt(dark_noise**2 + 0.25)
-    return electrons / efficiency
-
-
-def threshold_as_given(dark_noise, efficiency):
-    electrons = np.sqrt(dark_noise**2 + 0.25)
-    return 0.5 + electrons / efficiency
-
-
-def _threshold_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    for shape in SHAPES:
-        yield (rng.uniform(0.5, 30, shape), float(rng.uniform(0.1, 0.9)))
-    yield (np.array([0.0, 0.3, 1.0]), float(rng.uniform(0.1, 0.9)))  # a perfect amplifier, and nearly one
-    yield (rng.uniform(0.5, 30, 3), 1.0)  # each photon becomes an electron
-
-
-THRESHOLD = Exercise(
-    name="15.threshold_photons",
-    reference=threshold_photons,
-    cases=_threshold_cases,
-    as_given=threshold_as_given,
-    shown=((10.95, 0.451),),
-    hints=(
-        "Without noise in the dark and with η = 0.5 it says 1.5 photons. They give 0.75 electrons. Is their noise, "
-        "√0.75, as large as they are?",
-        "Say the unit of each term aloud. One of the two is divided by the efficiency, and the other is not.",
-        "`electrons = ___ + np.sqrt(dark_noise**2 + 0.25)`",
-    ),
-    praise="Without any read noise it is one electron: light brings noise of its own.",
-)
-
-
-@THRESHOLD.right
-def by_right_angles_again(dark_noise, efficiency):
-    return (0.5 + np.hypot(dark_noise, 0.5)) / efficiency
-
-
-@THRESHOLD.right
-def as_school_solves_quadratics(dark_noise, efficiency):
-    return (1 + np.sqrt(1 + 4 * dark_noise**2)) / 2 / efficiency
-
-
-@THRESHOLD.right
-def by_trying_again_and_again(dark_noise, efficiency):
-    electrons = dark_noise + 1.0
-    for _ in range(60):
-        electrons = np.sqrt(dark_noise**2 + electrons)
-    return electrons / efficiency
-
-
-@THRESHOLD.wrong("You left the light's own noise out. By your answer a perfect amplifier would need no light at all.")
-def noise_in_the_dark_alone(dark_noise, efficiency):
-    return dark_noise / efficiency
-
-
-@THRESHOLD.wrong("That is the approximation EMVA 1288 prints, σ_d + ½. The task asks for the exact root.")
-def as_the_standard_prints_it(dark_noise, efficiency):
-    return (dark_noise + 0.5) / efficiency
-
-
-@THRESHOLD.wrong("These are electrons. A photon gives only η of one, so divide by the efficiency.")
-def in_electrons(dark_noise, efficiency):
-    return 0.5 + np.sqrt(dark_noise**2 + 0.25)
-
-
-@THRESHOLD.wrong(
-    "You multiply by the efficiency. Where few photons become electrons *more* photons are needed: divide."
-)
-def times_the_efficiency(dark_noise, efficiency):
-    return (0.5 + np.sqrt(dark_noise**2 + 0.25)) * efficiency
-
-
-@THRESHOLD.wrong("That is the other root of the quadratic, and it is negative: no number of photons is.")
-def the_other_root(dark_noise, efficiency):
-    return (0.5 - np.sqrt(dark_noise**2 + 0.25)) / efficiency
-
-
-@THRESHOLD.wrong("The ½ in front of the root is missing: μ² − μ = σ_d² has the middle of its roots at ½.")
-def without_the_half(dark_noise, efficiency):
-    return np.sqrt(dark_noise**2 + 0.25) / efficiency
-
-
-@THRESHOLD.wrong("σ_d is a deviation. Under the root stands its square.")
-def dark_noise_not_squared(dark_noise, efficiency):
-    return (0.5 + np.sqrt(dark_noise + 0.25)) / efficiency
-
-
-@THRESHOLD.wrong("You let the two noises add as they are. They know nothing of each other, so their squares add.")
-def noises_added_as_they_are(dark_noise, efficiency):
-    return ((1 + np.sqrt(1 + 4 * dark_noise)) / 2) ** 2 / efficiency
-
-
-@THRESHOLD.wrong(
-    "You took the efficiency into the noise as well. σ_d is in electrons: find the electrons, then divide."
-)
-def dark_noise_in_photons(dark_noise, efficiency):
-    return 0.5 + np.sqrt((dark_noise / efficiency) ** 2 + 0.25)
-
-
-# 6: find the bug in the decibels --------------------------------------------------------------------------------------
-
-
-def dynamic_range_db(saturation: Array, dark_noise: Array) -> Array:
-    """20 log10 of saturation over the threshold σ_d + ½, all in electrons (...)."""
-    return 20 * np.log10(saturation / (dark_noise + 0.5))
-
-
-def dynamic_range_as_given(saturation, dark_noise):
-    return 20 * np.log(saturation / (dark_noise + 0.5))
-
-
-def _decibel_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    for shape in SHAPES:
-        yield (rng.uniform(3_000, 90_000, shape), rng.uniform(2, 30, shape))
-    noise = rng.uniform(2, 30, 3)
-    yield (np.array([0.1, 1, 1000]) * (noise + 0.5), noise)  # below the threshold, at it, and 60 dB above
-    yield (np.array([3000.0, 9000.0]), np.array([0.0, 0.7]))  # without any noise the threshold is ½
-
-
-DECIBELS = Exercise(
-    name="15.dynamic_range_db",
-    reference=dynamic_range_db,
-    cases=_decibel_cases,
-    as_given=dynamic_range_as_given,
-    shown=((13_973.0, 10.95),),
-    hints=(
-        "Put in a ratio whose decibels you know: saturation 1000 times the threshold is 60 dB. What comes out?",
-        "Every answer is too large by one and the same factor. Which logarithm has that value, and which base "
-        "does the decibel want?",
-        "`return 20 * np.___(saturation / (dark_noise + 0.5))`",
-    ),
-    praise="Common logarithms. The published result file of a reference data set has this very bug in it.",
-)
-
-
-@DECIBELS.right
-def levels_subtracted(saturation, dark_noise):
-    return 20 * (np.log10(saturation) - np.log10(dark_noise + 0.5))
-
-
-@DECIBELS.right
-def natural_over_ln_10(saturation, dark_noise):
-    return 20 * np.log(saturation / (dark_noise + 0.5)) / np.log(10)
-
-
-@DECIBELS.right
-def as_a_ratio_of_powers(saturation, dark_noise):
-    return 10 * np.log10((saturation / (dark_noise + 0.5)) ** 2)
-
-
-@DECIBELS.wrong("Ten is for ratios of power. EMVA 1288 counts a ratio of signals, with 20.")
-def ten_for_twenty(saturation, dark_noise):
-    return 10 * np.log10(saturation / (dark_noise + 0.5))
-
-
-@DECIBELS.wrong("You halved the 20 and left the logarithm as it was. The answers are smaller now, and no more right.")
-def ten_with_the_natural_logarithm(saturation, dark_noise):
-    return 10 * np.log(saturation / (dark_noise + 0.5))
-
-
-@DECIBELS.wrong("This is the exponent of ten, in bels of signal. A decibel is a twentieth of it: keep the 20.")
-def without_the_twenty(saturation, dark_noise):
-    return np.log10(saturation / (dark_noise + 0.5))
-
-
-@DECIBELS.wrong("With log2 you count stops (bits), here twenty times. Decibels take the common logarithm.")
-def twenty_times_stops(saturation, dark_noise):
-    return 20 * np.log2(saturation / (dark_noise + 0.5))
-
-
-@DECIBELS.wrong("These are stops: how often the signal can be halved. The question is in decibels.")
-def stops(saturation, dark_noise):
-    return np.log2(saturation / (dark_noise + 0.5))
-
-
-@DECIBELS.wrong("The logarithm is right. But the threshold, where signal equals noise, is σ_d + ½: keep the ½.")
-def over_the_noise(saturation, dark_noise):
-    return 20 * np.log10(saturation / dark_noise)
-
-
-@DECIBELS.wrong(
-    "That is the exact threshold, ½ + √(σ² + ¼). It is better physics, but the file that is to be mended took σ_d + ½."
-)
-def over_the_exact_threshold(saturation, dark_noise):
-    return 20 * np.log10(saturation / (0.5 + np.sqrt(dark_noise**2 + 0.25)))
-
-
-@DECIBELS.wrong("Without its brackets the ½ is added to the *ratio*: `a / b + 0.5` divides first.")
-def half_added_to_the_ratio(saturation, dark_noise):
-    return 20 * np.log10(saturation / dark_noise + 0.5)
-
-
-@DECIBELS.wrong("The ratio is upside down: it says by how much the threshold lies *below* saturation.")
-def upside_down(saturation, dark_noise):
-    return 20 * np.log10((dark_noise + 0.5) / saturation)
-
-
-@DECIBELS.wrong("A quotient of two logarithms is a logarithm to another base. The logarithm of a quotient is meant.")
-def quotient_of_logarithms(saturation, dark_noise):
-    return 20 * np.log10(saturation) / np.log10(dark_noise + 0.5)
-
-
-@DECIBELS.wrong("You *multiplied* by ln 10. The natural logarithm is too large by that factor already: divide.")
-def multiplied_by_ln_10(saturation, dark_noise):
-    return 20 * np.log(saturation / (dark_noise + 0.5)) * np.log(10)
-
-
-# 7: what rows and columns share ---------------------------------------------------------------------------------------
+# 6: what rows and columns share ---------------------------------------------------------------------------------------
 
 
 def stripes(frame: Array) -> Array:
@@ -973,6 +869,110 @@ def within_rows_and_columns(frame):
     of_rows, of_columns = np.var(frame, axis=1).mean(), np.var(frame, axis=0).mean()
     pixels = (np.var(frame) - of_rows - of_columns) / (1 - 1 / height - 1 / width)
     return np.array([of_rows - pixels / width, of_columns - pixels / height, pixels])
+
+
+# 7: the least light that can be measured ------------------------------------------------------------------------------
+
+
+def threshold_photons(dark_noise: Array, efficiency: float) -> Array:
+    """Photons (...) whose signal equals its noise: the positive root of μ² = σ_d² + μ, over the quantum efficiency."""
+    electrons = 0.5 + np.sqrt(dark_noise**2 + 0.25)
+    return electrons / efficiency
+
+
+def threshold_as_given(dark_noise, efficiency):
+    electrons = np.sqrt(dark_noise**2 + 0.25)
+    return 0.5 + electrons / efficiency
+
+
+def _threshold_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for shape in SHAPES:
+        yield (rng.uniform(0.5, 30, shape), float(rng.uniform(0.1, 0.9)))
+    yield (np.array([0.0, 0.3, 1.0]), float(rng.uniform(0.1, 0.9)))  # a perfect amplifier, and nearly one
+    yield (rng.uniform(0.5, 30, 3), 1.0)  # each photon becomes an electron
+
+
+THRESHOLD = Exercise(
+    name="15.threshold_photons",
+    reference=threshold_photons,
+    cases=_threshold_cases,
+    as_given=threshold_as_given,
+    shown=((10.95, 0.451),),
+    hints=(
+        "Without noise in the dark and with η = 0.5 it says 1.5 photons. They give 0.75 electrons. Is their noise, "
+        "√0.75, as large as they are?",
+        "Say the unit of each term aloud. One of the two is divided by the efficiency, and the other is not.",
+        "`electrons = ___ + np.sqrt(dark_noise**2 + 0.25)`",
+    ),
+    praise="Without any read noise it is one electron: light brings noise of its own.",
+)
+
+
+@THRESHOLD.right
+def by_right_angles_again(dark_noise, efficiency):
+    return (0.5 + np.hypot(dark_noise, 0.5)) / efficiency
+
+
+@THRESHOLD.right
+def as_school_solves_quadratics(dark_noise, efficiency):
+    return (1 + np.sqrt(1 + 4 * dark_noise**2)) / 2 / efficiency
+
+
+@THRESHOLD.right
+def by_trying_again_and_again(dark_noise, efficiency):
+    electrons = dark_noise + 1.0
+    for _ in range(60):
+        electrons = np.sqrt(dark_noise**2 + electrons)
+    return electrons / efficiency
+
+
+@THRESHOLD.wrong("You left the light's own noise out. By your answer a perfect amplifier would need no light at all.")
+def noise_in_the_dark_alone(dark_noise, efficiency):
+    return dark_noise / efficiency
+
+
+@THRESHOLD.wrong("That is the approximation EMVA 1288 prints, σ_d + ½. The task asks for the exact root.")
+def as_the_standard_prints_it(dark_noise, efficiency):
+    return (dark_noise + 0.5) / efficiency
+
+
+@THRESHOLD.wrong("These are electrons. A photon gives only η of one, so divide by the efficiency.")
+def in_electrons(dark_noise, efficiency):
+    return 0.5 + np.sqrt(dark_noise**2 + 0.25)
+
+
+@THRESHOLD.wrong(
+    "You multiply by the efficiency. Where few photons become electrons *more* photons are needed: divide."
+)
+def times_the_efficiency(dark_noise, efficiency):
+    return (0.5 + np.sqrt(dark_noise**2 + 0.25)) * efficiency
+
+
+@THRESHOLD.wrong("That is the other root of the quadratic, and it is negative: no number of photons is.")
+def the_other_root(dark_noise, efficiency):
+    return (0.5 - np.sqrt(dark_noise**2 + 0.25)) / efficiency
+
+
+@THRESHOLD.wrong("The ½ in front of the root is missing: μ² − μ = σ_d² has the middle of its roots at ½.")
+def without_the_half(dark_noise, efficiency):
+    return np.sqrt(dark_noise**2 + 0.25) / efficiency
+
+
+@THRESHOLD.wrong("σ_d is a deviation. Under the root stands its square.")
+def dark_noise_not_squared(dark_noise, efficiency):
+    return (0.5 + np.sqrt(dark_noise + 0.25)) / efficiency
+
+
+@THRESHOLD.wrong("You let the two noises add as they are. They know nothing of each other, so their squares add.")
+def noises_added_as_they_are(dark_noise, efficiency):
+    return ((1 + np.sqrt(1 + 4 * dark_noise)) / 2) ** 2 / efficiency
+
+
+@THRESHOLD.wrong(
+    "You took the efficiency into the noise as well. σ_d is in electrons: find the electrons, then divide."
+)
+def dark_noise_in_photons(dark_noise, efficiency):
+    return 0.5 + np.sqrt((dark_noise / efficiency) ** 2 + 0.25)
 
 
 EXERCISES = (NOISE, GAIN, FLAT_FIELD, DECIBELS, MERGE, STRIPES, THRESHOLD)

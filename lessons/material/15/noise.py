@@ -70,7 +70,7 @@ class PhotonTransferView(View):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not (wanted := self.panels.split()) or not {*wanted} <= {*_WIDE}:
-            raise ValueError(f"panels must be any of {', '.join(_WIDE)}, got {self.panels!r}")
+            raise ValueError(f"panels must be one or more of {', '.join(_WIDE)}, got {self.panels!r}")
         for name in ("gain", "frames", "bits"):
             if not getattr(self, name) >= 1:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
