@@ -32,8 +32,8 @@ CARD = 0.4  # of white: the even grey card that the noise is measured on
 LEVELS = np.geomspace(2.0**-12, 8.0, 32)  # seconds: half a stop apart, and as many
 _WIDTH, _HEIGHT = 640, 480
 _CARD = (0.70, 0.60, 0.96, 0.95)  # left, top, right, bottom, as shares of the picture
-_WIDE = {"picture": 340, "curve": 620, "histogram": 620, "figures": 240}
-"""The panels in their order, and how wide each is in picture units."""
+_WIDE = {"picture": 336, "curve": 624, "histogram": 620, "figures": 240}
+"""The panels in their order, and how wide each is in picture units; on a telephone the curve is scrolled sideways."""
 
 
 @dataclass(frozen=True)
