@@ -130,7 +130,6 @@ EXPLAINED = {
     ("14.fan", "Rolling shutter"): "each of its 480 rows is exposed 64 µs after the one above",
     ("14.first_shutter", "CMOS sensor"): "Sensors come in two kinds, CCD and CMOS.",
     ("14.first_decibel", "Dynamic range"): "Dynamic range is saturation divided by the threshold",
-    ("15.dark", "Dark frame"): "a picture taken under the lens cap, a dark frame",
 }
 """A question that says itself what its term means, and with which words."""
 

@@ -8,6 +8,7 @@ import re
 import numpy as np
 import pytest
 
+from camviz.draw.flow import WIDTH
 from camviz.sensors import Sensor
 from camviz.sensors.common_random_numbers import Draw, exposed
 from camviz_clinic.measuring.noise.measurement import Measurement
@@ -162,10 +163,39 @@ def test_a_reader_s_noise_is_drawn_beside_the_right_one_whatever_it_does():
     assert "ZeroDivisionError" in view.but(yours=lambda *_: 1 / 0).figure(draft=True).svg()
 
 
-def test_the_view_opens_without_the_histogram_and_most_numbers():
-    few = PhotonTransferView(panels="picture curve", fit=False)
-    for later in ("Histogram", "mostly from", "gain K"):
+def test_each_panel_opens_and_closes_and_is_drawn_alone():
+    for name in PhotonTransferView.openable:
+        drawn = PhotonTransferView(panels=name).figure(draft=True)
+        assert [tile.name for tile in drawn.tiles] == [name]
+        assert ("camera" in drawn.photographs) == (name == "picture")
+    few = PhotonTransferView(panels="picture", fit=False)
+    for later in ("Histogram", "mostly from", "gain K", "on the card"):
         assert later not in few.figure(draft=True).svg()
         assert later not in few.description()
-    with pytest.raises(ValueError, match="panels must be one of"):
-        PhotonTransferView(panels="curve")
+    opened = few.with_panels({"figures": True, "curve": True})
+    assert opened.opened == ("picture", "curve", "figures")
+    assert "on the card" in opened.description()
+    assert "gain K" not in opened.description()
+    for wrong in ("", "picture lines"):
+        with pytest.raises(ValueError, match="panels must be one or more of picture, curve, histogram, figures"):
+            PhotonTransferView(panels=wrong)
+
+
+@pytest.mark.parametrize("panels", ["picture figures", "curve figures", "picture curve histogram figures"])
+def test_the_tiles_hold_what_stands_in_them(panels):
+    """No tile reaches into another, and the last of the figures stands inside its own."""
+    view = PhotonTransferView(panels=panels)
+    for tile in (tiles := view.figure(draft=True).tiles):
+        left, top, width, height = tile.cell
+        assert left + width <= WIDTH
+        for other in tiles:
+            x, y, wide, high = other.cell
+            apart = x >= left + width or left >= x + wide or y >= top + height or top >= y + high
+            assert other is tile or apart
+    (x, y, _, height), told = view._layout["figures"], view._told()
+    assert y + 26 + 37 * (len(told) - 1) + 17 < y + height
+
+
+def test_a_full_card_is_called_full():
+    assert PhotonTransferView(exposure=2.0).numbers()["on the card"] == "full, 15,000 e⁻"
+    assert PhotonTransferView(exposure=1.0).numbers()["on the card"].startswith("8,000 e⁻ ± ")

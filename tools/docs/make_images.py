@@ -42,7 +42,7 @@ PICTURES = {
     "fisheye": FisheyeView(panels="picture curves"),
     "image_sensor": ImageSensorView(),
     "light_field": LightFieldView(slope=1.04, panels="picture slice"),
-    "noise": PhotonTransferView(),
+    "noise": PhotonTransferView(exposure=-8.0, dark_current=0.0, panels="picture curve"),
     "omnidirectional": OmnidirectionalView(panels="doughnut window", hfov_deg=80.0),
     "sharpness": SharpnessView(f_number=2.8, defocus_um=20.0),
     "fault_lab": FaultLabView(fault="column off", strength=0.5, seed=5).worst(),

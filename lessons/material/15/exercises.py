@@ -1,4 +1,4 @@
-"""Lesson 15, sensor noise: how kinds of noise add, gain from two frames, flat fields, HDR, a unit mixed up.
+"""Lesson 15, sensor noise: how kinds of noise add, gain from two frames, flat fields, HDR, stripes, units mixed up.
 
 Noise figures are standard deviations in electrons, frames are in digital numbers (DN), after EMVA Standard 1288.
 """
@@ -414,7 +414,115 @@ def dead_only_where_equal(frame, dark, flat):
     return (frame - dark) * np.nanmean(answer) / answer
 
 
-# 4: merge a bracket ---------------------------------------------------------------------------------------------------
+# 4: find the bug in the decibels --------------------------------------------------------------------------------------
+
+
+def dynamic_range_db(saturation: Array, dark_noise: Array) -> Array:
+    """20 log10 of saturation over the threshold σ_d + ½, all in electrons (...)."""
+    return 20 * np.log10(saturation / (dark_noise + 0.5))
+
+
+def dynamic_range_as_given(saturation, dark_noise):
+    return 20 * np.log(saturation / (dark_noise + 0.5))
+
+
+def _decibel_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for shape in SHAPES:
+        yield (rng.uniform(3_000, 90_000, shape), rng.uniform(2, 30, shape))
+    noise = rng.uniform(2, 30, 3)
+    yield (np.array([0.1, 1, 1000]) * (noise + 0.5), noise)  # below the threshold, at it, and 60 dB above
+    yield (np.array([3000.0, 9000.0]), np.array([0.0, 0.7]))  # without any noise the threshold is ½
+
+
+DECIBELS = Exercise(
+    name="15.dynamic_range_db",
+    reference=dynamic_range_db,
+    cases=_decibel_cases,
+    as_given=dynamic_range_as_given,
+    shown=((13_973.0, 10.95),),
+    hints=(
+        "Put in a ratio whose decibels you know: saturation 1000 times the threshold is 60 dB. What comes out?",
+        "Every answer is too large by one and the same factor. Which logarithm has that value, and which base "
+        "does the decibel want?",
+        "`return 20 * np.___(saturation / (dark_noise + 0.5))`",
+    ),
+    praise="Common logarithms. The published result file of a reference data set has this very bug in it.",
+)
+
+
+@DECIBELS.right
+def levels_subtracted(saturation, dark_noise):
+    return 20 * (np.log10(saturation) - np.log10(dark_noise + 0.5))
+
+
+@DECIBELS.right
+def natural_over_ln_10(saturation, dark_noise):
+    return 20 * np.log(saturation / (dark_noise + 0.5)) / np.log(10)
+
+
+@DECIBELS.right
+def as_a_ratio_of_powers(saturation, dark_noise):
+    return 10 * np.log10((saturation / (dark_noise + 0.5)) ** 2)
+
+
+@DECIBELS.wrong("Ten is for ratios of power. EMVA 1288 counts a ratio of signals, with 20.")
+def ten_for_twenty(saturation, dark_noise):
+    return 10 * np.log10(saturation / (dark_noise + 0.5))
+
+
+@DECIBELS.wrong("You halved the 20 and left the logarithm as it was. The answers are smaller now, and no more right.")
+def ten_with_the_natural_logarithm(saturation, dark_noise):
+    return 10 * np.log(saturation / (dark_noise + 0.5))
+
+
+@DECIBELS.wrong("This is the exponent of ten, in bels of signal. A decibel is a twentieth of it: keep the 20.")
+def without_the_twenty(saturation, dark_noise):
+    return np.log10(saturation / (dark_noise + 0.5))
+
+
+@DECIBELS.wrong("With log2 you count stops (bits), here twenty times. Decibels take the common logarithm.")
+def twenty_times_stops(saturation, dark_noise):
+    return 20 * np.log2(saturation / (dark_noise + 0.5))
+
+
+@DECIBELS.wrong("These are stops: how often the signal can be halved. The question is in decibels.")
+def stops(saturation, dark_noise):
+    return np.log2(saturation / (dark_noise + 0.5))
+
+
+@DECIBELS.wrong("The logarithm is right. But the threshold, where signal equals noise, is σ_d + ½: keep the ½.")
+def over_the_noise(saturation, dark_noise):
+    return 20 * np.log10(saturation / dark_noise)
+
+
+@DECIBELS.wrong(
+    "That is the exact threshold, ½ + √(σ² + ¼). It is better physics, but the file that is to be mended took σ_d + ½."
+)
+def over_the_exact_threshold(saturation, dark_noise):
+    return 20 * np.log10(saturation / (0.5 + np.sqrt(dark_noise**2 + 0.25)))
+
+
+@DECIBELS.wrong("Without its brackets the ½ is added to the *ratio*: `a / b + 0.5` divides first.")
+def half_added_to_the_ratio(saturation, dark_noise):
+    return 20 * np.log10(saturation / dark_noise + 0.5)
+
+
+@DECIBELS.wrong("The ratio is upside down: it says by how much the threshold lies *below* saturation.")
+def upside_down(saturation, dark_noise):
+    return 20 * np.log10((dark_noise + 0.5) / saturation)
+
+
+@DECIBELS.wrong("A quotient of two logarithms is a logarithm to another base. The logarithm of a quotient is meant.")
+def quotient_of_logarithms(saturation, dark_noise):
+    return 20 * np.log10(saturation) / np.log10(dark_noise + 0.5)
+
+
+@DECIBELS.wrong("You *multiplied* by ln 10. The natural logarithm is too large by that factor already: divide.")
+def multiplied_by_ln_10(saturation, dark_noise):
+    return 20 * np.log(saturation / (dark_noise + 0.5)) * np.log(10)
+
+
+# 5: merge a bracket ---------------------------------------------------------------------------------------------------
 
 
 def merge(electrons: Array, exposures: Array, dark_noise: float, full_well: float) -> Array:
@@ -630,7 +738,140 @@ def the_longest_alone(electrons, exposures, dark_noise, full_well):
     return np.where(usable.any(axis=0), best, np.nan)
 
 
-# 5: the least light that can be measured ------------------------------------------------------------------------------
+# 6: what rows and columns share ---------------------------------------------------------------------------------------
+
+
+def stripes(frame: Array) -> Array:
+    """The variances (3,) of rows, of columns and of single pixels in a frame (height, width), split after EMVA 1288."""
+    height, width = frame.shape
+    of_rows, of_columns = np.var(frame.mean(axis=1)), np.var(frame.mean(axis=0))
+    pixels = (np.var(frame) - of_rows - of_columns) / (1 - 1 / height - 1 / width)
+    return np.array([of_rows - pixels / width, of_columns - pixels / height, pixels])
+
+
+def _stripe_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for height, width in ((40, 60), (60, 25), (9, 14), (30, 30)):
+        row, column, pixel = rng.uniform(0.5, 4, 3)
+        shared = row * rng.standard_normal((height, 1)) + column * rng.standard_normal(width)
+        yield (rng.uniform(-2, 2) + shared + pixel * rng.standard_normal((height, width)),)
+    noise = rng.uniform(4, 9) * rng.standard_normal((8, 12))
+    yield (noise - noise.mean(axis=0) - noise.mean(axis=1, keepdims=True),)  # fewer stripes than chance: below 0
+
+
+STRIPES = Exercise(
+    name="15.stripes",
+    reference=stripes,
+    cases=_stripe_cases,
+    hints=(
+        "Begin with the pixels: subtract the second and the third equation from the first. What is left of σ²_pixel?",
+        "The mean of a row is `frame.mean(axis=1)`: it runs along axis 1. What is left for the pixels is "
+        "σ²_pixel (1 − 1/height − 1/width).",
+        "`pixels = (np.var(frame) - ___ - ___) / (1 - 1 / height - 1 / width)`",
+    ),
+    praise="Stripes far below the noise of the pixels, and their strength is known.",
+)
+
+
+@STRIPES.right
+def as_linear_equations(frame):
+    height, width = frame.shape
+    seen = [np.var(frame), np.var(frame.mean(axis=1)), np.var(frame.mean(axis=0))]
+    return np.linalg.solve([[1, 1, 1], [1, 0, 1 / width], [0, 1, 1 / height]], seen)
+
+
+@STRIPES.right
+def by_what_rows_and_columns_leave(frame):
+    rows, columns = frame.mean(axis=1, keepdims=True), frame.mean(axis=0, keepdims=True)
+    height, width = frame.shape
+    left = np.sum((frame - rows - columns + frame.mean()) ** 2) / (height * width - height - width)
+    return [np.mean((rows - frame.mean()) ** 2) - left / width, np.var(columns) - left / height, left]
+
+
+@STRIPES.right
+def column_by_column(frame):
+    import cv2
+
+    height, width = frame.shape
+    whole, of_rows, of_columns = (
+        cv2.meanStdDev(np.float64(one))[1][0, 0] ** 2 for one in (frame, frame.mean(axis=1), frame.mean(axis=0))
+    )
+    pixels = (whole - of_rows - of_columns) * height * width / (height * width - height - width)
+    return np.array((of_rows - pixels / width, of_columns - pixels / height, pixels))
+
+
+def _means(frame):
+    """The variances of the whole, and of the means of rows and of columns."""
+    return np.var(frame), np.var(frame.mean(axis=1)), np.var(frame.mean(axis=0))
+
+
+@STRIPES.wrong("Rows and columns have changed places: `axis=0` runs down a column, `axis=1` along a row.")
+def axes_exchanged(frame):
+    return stripes(frame)[[1, 0, 2]]
+
+
+@STRIPES.wrong(
+    "These are the variances of the *means*. A share of the pixels' own noise is in them: the third and the second "
+    "equation say how much."
+)
+def means_as_they_are(frame):
+    whole, of_rows, of_columns = _means(frame)
+    return np.array([of_rows, of_columns, whole - of_rows - of_columns])
+
+
+@STRIPES.wrong("The pixels' variance is right. Take its share, one part in the number of pixels, off the other two.")
+def share_left_in(frame):
+    _, of_rows, of_columns = _means(frame)
+    return np.array([of_rows, of_columns, stripes(frame)[2]])
+
+
+@STRIPES.wrong("The shares are exchanged: a row's mean is over `width` pixels, a column's over `height`.")
+def shares_exchanged(frame):
+    _, of_rows, of_columns = _means(frame)
+    height, width = frame.shape
+    pixels = stripes(frame)[2]
+    return np.array([of_rows - pixels / height, of_columns - pixels / width, pixels])
+
+
+@STRIPES.wrong("For the pixels you took the whole variance. That of rows and of columns is in it.")
+def whole_for_the_pixels(frame):
+    whole, of_rows, of_columns = _means(frame)
+    height, width = frame.shape
+    return np.array([of_rows - whole / width, of_columns - whole / height, whole])
+
+
+@STRIPES.wrong(
+    "What the means have was taken off, and of the pixels' own noise with it: divide by 1 − 1/height − 1/width."
+)
+def pixels_not_made_whole(frame):
+    whole, of_rows, of_columns = _means(frame)
+    height, width = frame.shape
+    pixels = whole - of_rows - of_columns
+    return np.array([of_rows - pixels / width, of_columns - pixels / height, pixels])
+
+
+@STRIPES.wrong("These are deviations, the roots. The task asks for variances.")
+def deviations_of_stripes(frame):
+    return np.sqrt(np.maximum(stripes(frame), 0))
+
+
+@STRIPES.wrong(
+    "An estimate below 0 was cut off. Where there are no stripes chance leads to either side: keep the sign."
+)
+def cut_off_below_zero(frame):
+    return np.maximum(stripes(frame), 0)
+
+
+@STRIPES.wrong(
+    "You took the variance *within* each row and column, on average. The variance *of their means* is wanted."
+)
+def within_rows_and_columns(frame):
+    height, width = frame.shape
+    of_rows, of_columns = np.var(frame, axis=1).mean(), np.var(frame, axis=0).mean()
+    pixels = (np.var(frame) - of_rows - of_columns) / (1 - 1 / height - 1 / width)
+    return np.array([of_rows - pixels / width, of_columns - pixels / height, pixels])
+
+
+# 7: the least light that can be measured ------------------------------------------------------------------------------
 
 
 def threshold_photons(dark_noise: Array, efficiency: float) -> Array:
@@ -734,4 +975,4 @@ def dark_noise_in_photons(dark_noise, efficiency):
     return 0.5 + np.sqrt((dark_noise / efficiency) ** 2 + 0.25)
 
 
-EXERCISES = (NOISE, GAIN, FLAT_FIELD, MERGE, THRESHOLD)
+EXERCISES = (NOISE, GAIN, FLAT_FIELD, DECIBELS, MERGE, STRIPES, THRESHOLD)

@@ -5,7 +5,7 @@ A reader's own function can draw the curve beside the right one.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from math import isfinite, log10
@@ -15,7 +15,7 @@ import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import plot, svg
-from camviz.draw.flow import Cell, rows
+from camviz.draw.flow import WIDTH, Cell, rows, shortened
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, seconds
@@ -32,11 +32,8 @@ CARD = 0.4  # of white: the even grey card that the noise is measured on
 LEVELS = np.geomspace(2.0**-12, 8.0, 32)  # seconds: half a stop apart, and as many
 _WIDTH, _HEIGHT = 640, 480
 _CARD = (0.70, 0.60, 0.96, 0.95)  # left, top, right, bottom, as shares of the picture
-_EVERYTHING = "picture histogram curve"
-_LAYOUTS = {  # by the panels there are
-    "picture curve": rows((374, {"picture": 460, "curve": 500}), (200, {"numbers": 250, "lines": 220})),
-    _EVERYTHING: rows((374, {"picture": 460, "curve": 500}), (306, {"histogram": 490, "numbers": 250, "lines": 220})),
-}
+_WIDE = {"picture": 336, "curve": 624, "histogram": 620, "figures": 240}
+"""The panels in their order, and how wide each is in picture units; on a telephone the curve is scrolled sideways."""
 
 
 @dataclass(frozen=True)
@@ -45,14 +42,14 @@ class PhotonTransferView(View):
 
     `exposure` is in stops: 0 is one second, each step halves or doubles. At `gain` 1 the converter reaches its end as
     the well does, at 15 000 electrons; more gain gives more DN per electron, and less room. With `difference` the
-    noise is that of the difference of two frames over √2, else what varies over the pixels of one. Without `fit` it is
-    not told which gain these points give. `panels` says what is drawn: everything, or "picture curve", which leaves out
-    the histogram and most numbers. `yours` is a reader's function of (electrons, read_noise, prnu) to the noise of one
-    frame, in electrons (...) and a fraction; its curve is orange.
+    noise is that of the difference of two frames over √2, else what varies over the pixels of one. With `fit` it is
+    told which gain the points of the curve give. `panels` names what is drawn: any of picture, curve, histogram and
+    figures. `yours` is a reader's function of (electrons, read_noise, prnu) to the noise of one frame, in electrons
+    (...) and a fraction; its curve is orange.
     """
 
     title: ClassVar[str] = "Photon transfer"
-    layouts = _LAYOUTS
+    openable: ClassVar[Mapping[str, str]] = {name: name.replace("figures", "numbers") for name in _WIDE}
 
     exposure: float = slider(-3.0, -10.0, 3.0, 0.25, unit="stops", help="0 is one second; −1 half of it")
     gain: float = slider(1.0, 1.0, 16.0, 0.5, unit="×", help="more numbers for each electron, as ISO does")
@@ -67,11 +64,13 @@ class PhotonTransferView(View):
     difference: bool = switch(False, label="difference of two frames", help="take the fixed pattern out")
     brighten: bool = switch(True, help="show dim pictures as bright as others")
     fit: bool = switch(True, label="fit K", help="read the gain K off the points: variance over signal")
-    panels: str = _EVERYTHING
+    panels: str = " ".join(_WIDE)
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if not (wanted := self.panels.split()) or not {*wanted} <= {*_WIDE}:
+            raise ValueError(f"panels must be one or more of {', '.join(_WIDE)}, got {self.panels!r}")
         for name in ("gain", "frames", "bits"):
             if not getattr(self, name) >= 1:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
@@ -136,15 +135,11 @@ class PhotonTransferView(View):
     def _frames(self, electrons: np.ndarray, pixels: int, seed: int) -> np.ndarray:
         """Two frames of the card at each level (n, 2, pixels), in DN."""
         draw = _draw((len(LEVELS), 2, pixels), (pixels,), seed)
-        times = LEVELS[:, None, None]
-        return self._exposed(electrons[:, None, None], times, draw)
+        return self._exposed(electrons[:, None, None], LEVELS[:, None, None], draw)
 
     def _exposed(self, electrons: np.ndarray, exposure_s: np.ndarray | float, draw: Draw) -> np.ndarray:
-        return exposed(
-            *(self.sensor, electrons, exposure_s, self.temperature_c, draw),
-            averaged=self.frames,
-            photon_noise=self.photon_noise,
-        )
+        how = self.sensor, electrons, exposure_s, self.temperature_c, draw
+        return exposed(*how, averaged=self.frames, photon_noise=self.photon_noise)
 
     def _noise(self, frames: np.ndarray) -> np.ndarray:
         if self.difference:
@@ -167,12 +162,12 @@ class PhotonTransferView(View):
         parts = self.parts(np.array([self.card_e]))
         K = self.sensor.gain_dn_per_e
         whole = float(np.sqrt(sum(part[0] ** 2 for part in parts.values()))) / K
-        full = self._saturated_share
+        full, seen = self._saturated_share, f"{_electrons(self.card_e)} e⁻ ± {_electrons(whole)}"
         return {
             "exposure": seconds(self.exposure_s),
             "gain K": f"{K:.4g} DN/e⁻",
             **self._fitted(pixels),
-            "on the card": f"{_electrons(self.card_e)} e⁻ ± {_electrons(whole)}",
+            "on the card": seen if full < 0.5 else f"full, {FULL_WELL_E:,.0f} e⁻",
             "signal / noise": f"{self.card_e / max(whole, 1e-9):.3g}" if full < 0.5 else "saturated",
             "mostly from": max(parts, key=lambda name: float(parts[name][0])),
             "card saturated": f"{100 * full:.0f} %",
@@ -198,32 +193,48 @@ class PhotonTransferView(View):
         return min(2**self.bits - 1.0, well)
 
     def description(self, pixels: int = 3000) -> str:
-        figures = listed(self._told(pixels))
+        figures = f": {listed(told)}" if (told := self._told(pixels)) else f": exposure {seconds(self.exposure_s)}"
         how = "the difference of two frames" if self.difference else "one frame"
-        return f"Noise of {how}, {self.bits} bits, {self.temperature_c:g} °C, {self.frames} averaged: {figures}."
+        return f"Noise of {how}, {self.bits} bits, {self.temperature_c:g} °C, {self.frames} averaged{figures}."
 
     def _told(self, pixels: int = 3000) -> dict[str, str]:
         """The figures that stand beside the panels."""
+        if not self._has("figures"):
+            return {}
         figures = self.numbers(pixels)
-        if self.panels == _EVERYTHING:
-            return figures
-        kept = ("exposure", "on the card", "signal / noise", "K from the curve")
-        return {name: figures[name] for name in kept if name in figures}
+        later = () if self._has("histogram") else ("mostly from", "card saturated")
+        return {name: told for name, told in figures.items() if name not in (*later, "" if self.fit else "gain K")}
 
     # What it looks like -----------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
         pixels = 1500 if draft else 3000
-        dn = self.image(draft=draft)
-        parts = {"picture": self._picture_panel(), "curve": self._transfer_panel(pixels)}
-        if self.panels == _EVERYTHING:
-            parts["histogram"] = self._histogram_panel(dn)
-        parts |= {"numbers": self._numbers_column(pixels), "lines": self._legend()}
-        return self.tiled(self._layout, parts, {"camera": jpeg(self._developed(dn))}, self.description(pixels))
+        dn = self.image(draft=draft) if self._has("picture") or self._has("histogram") else np.zeros((1, 1))
+        draw: dict[str, Callable[[], str]] = {
+            "picture": self._picture_panel,
+            "curve": lambda: self._transfer_panel(pixels),
+            "histogram": lambda: self._histogram_panel(dn),
+            "figures": lambda: readout(self._told(pixels), self._corner("figures", 10, 26), (0, 37), (0, 17)),
+        }
+        photographs = {"camera": jpeg(self._developed(dn))} if self._has("picture") else {}
+        parts = {name: draw[name]() for name in self._layout}
+        return self.tiled(self._layout, parts, photographs, self.description(pixels))
 
-    @property
+    @cached_property
     def _layout(self) -> dict[str, Cell]:
-        return _LAYOUTS[self.panels]
+        """As many panels in a row as it has room for, in their order."""
+        lines: list[dict[str, float]] = [{}]
+        for name in filter(self._has, _WIDE):
+            if sum(lines[-1].values()) + _WIDE[name] > WIDTH:
+                lines.append({})
+            lines[-1][name] = _WIDE[name]
+        figures = 37 * (3 + 2 * self.fit + 2 * self._has("histogram")) + 12
+        return shortened(rows(*((310, line) for line in lines)), figures=figures, picture=284)
+
+    def _corner(self, tile: str, right: float, down: float) -> tuple[float, float]:
+        """A place in a tile, from its upper left corner."""
+        x, y, *_ = self._layout[tile]
+        return x + right, y + down
 
     def image(self, *, draft: bool) -> np.ndarray:
         """What the camera records of the garden with the card in it, DN (height, width)."""
@@ -238,11 +249,10 @@ class PhotonTransferView(View):
         return to_display((dn - self.sensor.offset_dn) / max(scale, 1e-9))
 
     def _picture_panel(self) -> str:
-        panel = image_panel("picture", 10, 34, 440, _WIDTH, _HEIGHT)
+        panel = image_panel("picture", *self._corner("picture", 10, 34), _WIDE["picture"] - 20, _WIDTH, _HEIGHT)
         left, top, right, bottom = (s * n for s, n in zip(_CARD, (_WIDTH, _HEIGHT) * 2, strict=True))
-        outline = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]
         shown = placed_image(panel, "camera", _WIDTH, _HEIGHT, style="image-rendering:pixelated")
-        shown += svg.line(panel.place(outline), "yellow")
+        shown += svg.polygon(panel.place([(left, top), (right, top), (right, bottom), (left, bottom)]), "yellow")
         note = "brightened" if self.brighten else "as recorded"
         return panel.show(shown, title=f"The garden in {seconds(self.exposure_s)}", note=note)
 
@@ -251,32 +261,31 @@ class PhotonTransferView(View):
         top = min(2**self.bits, 2 ** int(np.ceil(np.log2(max(float(dn.max()) + 1, 16)))))
         edges = np.linspace(-0.5, top - 0.5, min(top, 128) + 1)
         rows, columns = _card_slices(*dn.shape)
-        panel = plot.plot_panel("histogram", 64, 408, 416, 224, (-0.02 * top, 1.02 * top), (0, 1.08))
-        shares = []
+        place = self._corner("histogram", 64, 34)
+        panel = plot.plot_panel("histogram", *place, 500, 226, (-0.02 * top, 1.02 * top), (0, 1.08))
+        content = plot.legend(panel, [("muted thick", "picture"), ("blue thick", "card")], "top right")
         for values, class_ in ((dn, "fill-muted half"), (dn[rows, columns], "fill-blue half")):
             counts = np.histogram(values, edges)[0]
-            shares.append(plot.bars(panel, edges[:-1], edges[1:], np.sqrt(counts / counts.max()), class_))
-        legend = [("muted thick", "picture"), ("blue thick", "card")]
+            content += plot.bars(panel, edges[:-1], edges[1:], np.sqrt(counts / counts.max()), class_)
         yticks = [(0.0, "0"), (1.0, "most")]
-        content = "".join(shares) + plot.legend(panel, legend, "top right")
         return plot.plotted(panel, content, "digital number (DN)", "√ pixels", None, yticks, title="Histogram")
 
     @cached_property
     def _plot(self) -> Panel:
         """Logarithmic axes that do not move with the gain: an electron at gain 1 is always in the same place."""
         one = 0.97 * 2**self.bits / FULL_WELL_E
-        across = (log10(0.6 * one), log10(1.3 * 2**self.bits))
-        return plot.plot_panel("transfer", 524, 34, 426, 290, across, (log10(0.4 * one), log10(0.12 * 2**self.bits)))
+        across, up = (log10(0.6 * one), log10(1.3 * 2**self.bits)), (log10(0.4 * one), log10(0.12 * 2**self.bits))
+        return plot.plot_panel("transfer", *self._corner("curve", 64, 34), 362, 226, across, up)
 
     def _transfer_panel(self, pixels: int) -> str:
         panel = self._plot
         ticks = plot.logarithmic(panel.left, panel.right), plot.logarithmic(panel.bottom, panel.top)
-        content = self._curves(panel) + self._points(panel, pixels)
+        content, beside = self._curves(panel) + self._points(panel, pixels), self._legend()
         how = "the difference of two" if self.difference else "one frame"
         label = "Noise over signal; drag or press the arrow keys to change the exposure"
         heading: dict[str, Any] = {"hint": "drag to change the exposure", "drag": "exposure", "label": label}
         names = "signal above the dark (DN)", "noise, σ (DN)"
-        return plot.plotted(panel, content, *names, *ticks, title=f"Noise of {how}", **heading)
+        return plot.plotted(panel, content, *names, *ticks, title=f"Noise of {how}", **heading) + beside
 
     def _curves(self, panel: Panel) -> str:
         """Every kind of noise as a line of its own slope, and all together."""
@@ -308,17 +317,15 @@ class PhotonTransferView(View):
         return _STYLES if self.yours is None else {**_STYLES, "photons": ("yellow dashed", "½")}
 
     def _legend(self) -> str:
-        """Beside the numbers: wherever it stood among the curves, some gain would lead one through it."""
-        x, y, width, height = self._layout["lines"]
+        """Beside the curves: wherever it stood among them, some gain would lead one through it."""
         parts = self.parts(np.array([self.card_e]))
         styles = self._styles()
         drawn = [(styles[name], name) for name in styles if name in parts and parts[name].max() > 0]
         named = [(class_, f"{name} (slope {slope})") for (class_, slope), name in drawn]
         named += [("orange thick", "yours")] if self.yours else []
         lines = plot.legend(self._plot, [("ink", "all together"), *named])
-        return svg.text((x + 10, y + 26), "The lines", "title") + svg.element(
-            "svg", lines, x=x, y=y + 34, width=width, height=height - 34
-        )
+        x, y = self._corner("curve", 430, 34)
+        return svg.element("svg", lines, x=x, y=y, width=190, height=226)
 
     def _points(self, panel: Panel, pixels: int) -> str:
         """What frames of the card say, and the exposure of the picture."""
@@ -331,21 +338,19 @@ class PhotonTransferView(View):
         here = svg.dots([panel.place((at, log10(max(whole, 1e-9))))], "yellow", 13)
         return plot.upright(panel, at, "yellow dashed") + here + svg.dots(points, "blue", 6)
 
-    def _numbers_column(self, pixels: int) -> str:
-        x, y, _, _ = self._layout["numbers"]
-        figures = readout(self._told(pixels), (x + 10, y + 50), (0, 36), (0, 16))
-        return svg.text((x + 10, y + 26), "On the card", "title") + figures
-
     # The exposure is dragged along the curve --------------------------------------------------------------------------
 
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> PhotonTransferView:
         if handle != "exposure":
             return self
-        stops = self.exposure + dx / self._plot.scale[0] / log10(2)
-        return self.but(exposure=float(np.clip(stops, *_limits("exposure"))))
+        return self._exposed_by(dx / self._plot.scale[0] / log10(2))
 
     def pressed(self, handle: str, key: str) -> PhotonTransferView:
-        return self.but(exposure=float(np.clip(self.exposure + 0.5 * step_of(key), *_limits("exposure"))))
+        return self._exposed_by(0.5 * step_of(key))
+
+    def _exposed_by(self, stops: float) -> PhotonTransferView:
+        """The view with so many stops more."""
+        return self.but(exposure=self.controls()["exposure"].held("exposure", self.exposure + stops))
 
 
 _STYLES = {
@@ -356,13 +361,6 @@ _STYLES = {
     "dark current": ("red dotted", "½"),
     "PRNU": ("purple dashed", "1"),
 }
-
-
-def _limits(name: str) -> tuple[float, float]:
-    control = PhotonTransferView.controls()[name]
-    assert control.low is not None
-    assert control.high is not None
-    return control.low, control.high
 
 
 @lru_cache(maxsize=2)
