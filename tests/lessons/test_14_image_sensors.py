@@ -319,6 +319,11 @@ def test_an_incandescent_bulb_leaves_little_blue_on_a_ccd_without_microlenses(sa
     assert f"KAF-{name.value:04.0f}" == KAF_0400.name
     assert at_550 == KAF_0400_CURVE[green.value]
     assert at_400 == KAF_0400_CURVE[blue.value]
+    for chosen in (
+        says("then choose **efficiency: KAF-0400: a curve**."),
+        says("Choose the **KAF-0400** and take **light** A, an incandescent bulb: what happens to blue?"),
+    ):
+        assert chosen[0] == name.value
     (times,) = says("White balance will have to multiply it by 5.5, its noise included.")
     nm, power = spectrum("A")
     filters = (

@@ -538,14 +538,9 @@ def by_the_thermal_voltage(uv_per_electron, kelvin):
     return (thermal_uv / np.asarray(uv_per_electron)) ** 0.5
 
 
-@RESET_NOISE_E.wrong("The root is missing: √(k T C), for it is the noise's *square* that grows with k T C.")
+@RESET_NOISE_E.wrong("Next to nothing: is the root there, is only k T C under it, and is it divided by the charge q?")
 def without_the_root(uv_per_electron, kelvin):
     return BOLTZMANN * kelvin * (CHARGE / (1e-6 * np.asarray(uv_per_electron))) / CHARGE
-
-
-@RESET_NOISE_E.wrong("This is the noise in coulombs. Divide by the charge of an electron to count electrons.")
-def in_coulombs(uv_per_electron, kelvin):
-    return CHARGE * reset_noise_e(uv_per_electron, kelvin)
 
 
 @RESET_NOISE_E.wrong("This is the noise in volts, √(k T / C). One electron makes q/C volts: divide by that.")
@@ -583,11 +578,6 @@ def celsius_taken(uv_per_electron, kelvin):
 @RESET_NOISE_E.wrong("Your function is for 300 K only. Use `kelvin`: a cooled sensor has less.")
 def at_room_temperature(uv_per_electron, kelvin):
     return reset_noise_e(uv_per_electron, 300.0)
-
-
-@RESET_NOISE_E.wrong("The charge stands under the root too, in yours. √(k T C) is divided by q, and not k T C.")
-def charge_under_the_root(uv_per_electron, kelvin):
-    return np.sqrt(BOLTZMANN * kelvin / (1e-6 * np.asarray(uv_per_electron)))
 
 
 EXERCISES = (ROW_TIME, DYNAMIC_RANGE_DB, ARRIVING, EXPECTED_ELECTRONS, RESET_NOISE_E)
