@@ -743,6 +743,11 @@ def test_types_mix_however_the_table_is_sorted(says):
     for column in columns.values():
         types = [one.technology for one in sorted(rows, key=column)]
         assert sum(first != second for first, second in pairwise(types)) >= 2
+    says("By dynamic range the best of them is a CCD, and so is the worst. CMOS sensors lie between.")
+    stated = [one for one in rows if np.isfinite(one.stated_dynamic_range_db)]
+    in_order = [one.technology for one in sorted(stated, key=lambda one: one.stated_dynamic_range_db)]
+    assert in_order[0] == in_order[-1] == "CCD"
+    assert "CMOS" in in_order
     by_range = [one.technology for one in sorted(rows, key=columns["range"])]
     assert by_range[0] == by_range[-1] == "CCD"
     assert "CMOS" in by_range
