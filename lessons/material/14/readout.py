@@ -128,22 +128,16 @@ class ReadoutView(View):
     def numbers(self) -> dict[str, str]:
         """The state's key figures, as text."""
         frame = {"frame": f"{ROWS} rows · {self.row_us:g} µs = {1e3 * self.frame_s:.1f} ms"}
-        read = {
-            "exposure": f"{self.exposure_ms:g} ms",
-            "read so far": f"{round(ROWS * self.time / 100)} of {ROWS} rows",
-        }
+        so_far = f"{round(ROWS * self.time / 100)} of {ROWS} rows"
+        read = {"exposure": f"{self.exposure_ms:g} ms", "read so far": so_far}
         if self.subject == "wall under a lamp":
             stripes, (row_s, problem) = f"{self.stripes:.2f} in a frame" if self.rolling else "none", self.your_row_s
             yours = {} if problem or self.yours is None else {"row time, yours": f"{1e6 * row_s:.4g} µs"}
             return frame | {"stripes of the lamp": stripes} | yours | read
         unit, what = ("turns/s", "a blade's tip") if self.subject == "fan" else ("m/s", "a thing at 3 m")
-        blur_px = self.moved_px(self.exposure_ms / 1000)
-        lean_px = self.moved_px((ROWS - 1) * self.row_us * 1e-6) if self.rolling else 0.0
-        between = f"{what} moves {lean_px:.0f} px"
-        moved = {
-            "during one exposure": f"{what} moves {blur_px:.0f} px",
-            "between first and last row's exposure": between,
-        }
+        seconds = self.exposure_ms / 1000, (ROWS - 1) * self.row_us * 1e-6 * self.rolling
+        blur, lean = (f"{what} moves {self.moved_px(one):.0f} px" for one in seconds)
+        moved = {"during one exposure": blur, "between first and last row's exposure": lean}
         return frame | {"speed": f"{self.speed:g} {unit}"} | moved | read
 
     def description(self) -> str:
