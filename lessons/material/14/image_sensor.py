@@ -41,7 +41,8 @@ _MODELS: dict[str, PublishedSensor] = {
     "CMV4000: 60 % at 550 nm": CMV4000,
 }
 _MOST_E = 100_000.0
-_SIZES = {"photograph": (460, 374), "efficiency": (500, 374), "electrons": (500, 240), "numbers": (440, 240)}
+_BESIDE = {"electrons": (420, 276), "sensor": (270, 240), "numbers": (270, 240)}
+_SIZES = {"photograph": (460, 374), "efficiency": (500, 374)} | _BESIDE
 """The panels in their order, and how wide and high each is in picture units."""
 
 
@@ -54,7 +55,7 @@ class ImageSensorView(View):
     published figure includes. Pitch and read noise are the published sensor's too. The gain is such that the converter
     ends just where the well is full, so the full well is the saturation capacity here. It opens as the IMX174 does.
 
-    `panels` names what is drawn, one or more of photograph, efficiency, electrons and numbers. With `yours`, a
+    `panels` names what is drawn: any of photograph, efficiency, electrons, sensor and numbers. With `yours`, a
     reader's function of lux on the wall, f-number, pitch in µm, exposure in s and efficiency, there are two more bars:
     an unfiltered pixel under green light of 555 nm, and the same by that function.
     """
@@ -72,7 +73,7 @@ class ImageSensorView(View):
         32_700.0, 300.0, _MOST_E, 100.0, label="full well", unit="e⁻", help="what a pixel can hold"
     )
     bits: float = slider(16.0, 2.0, 16.0, 1.0, unit="bits", help="of the converter")
-    panels: str = "photograph efficiency electrons numbers"
+    panels: str = "photograph efficiency electrons sensor numbers"
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -158,7 +159,8 @@ class ImageSensorView(View):
             "photograph": lambda: self._photograph(width, photographs),
             "efficiency": self._spectra,
             "electrons": self._electrons,
-            "numbers": self._figures,
+            "sensor": lambda: self._figures("sensor"),
+            "numbers": lambda: self._figures("numbers"),
         }
         return self.tiled(self._layout, {name: draw[name]() for name in self._layout}, photographs)
 
@@ -201,7 +203,7 @@ class ImageSensorView(View):
             freed |= {"muted": self.green_e, "orange": self.your_e[0]}
             names += ["555 nm", "yours"]
         x, y, *_ = self._layout["electrons"]
-        panel = plot_panel("electrons", x + 66, y + 34, 420, 156, (0.4, len(names) + 1.9), (low, high))
+        panel = plot_panel("electrons", x + 66, y + 34, 344, 156, (0.4, len(names) + 1.9), (low, high))
         yticks = logarithmic(low, high)
         xticks = [(i + 1.0, name) for i, name in enumerate(names)]
         content = grid(panel, xticks=[], yticks=yticks)
@@ -219,28 +221,29 @@ class ImageSensorView(View):
             y = float(panel.place((0, np.log10(max(electrons, 1))))[1])
             content += svg.line([(0, y), (panel.width, y)], f"{class_} dashed")
             content += svg.text((panel.width - 6, y - 6), f"{name} {electrons:{form}} e⁻", f"{class_} halo end")
-        return axes(panel, "pixels of a white wall", "electrons", xticks, yticks, aside=54) + panel.show(
-            content, title="Electrons in a pixel", note=f"{self.exposure_ms:g} ms, f/4, {SCENE_LUX:g} lux"
+        problem = svg.paragraph((x + 66, y + 252), self.your_e[1], 344) if self.yours else ""
+        return (
+            problem
+            + axes(panel, "pixels of a white wall", "electrons", xticks, yticks, aside=54)
+            + panel.show(content, title="Electrons in a pixel", note=f"{self.exposure_ms:g} ms, f/4, {SCENE_LUX:g} lux")
         )
 
     def _in_words(self, panel: Panel, bar: int) -> str:
-        """The two counts in green light above their bars, or what is in the way of the reader's."""
-        electrons, problem = self.your_e
-        words = svg.paragraph((14, 46), problem, panel.width - 28, "note halo") if problem else ""
+        """The two counts in green light in their bars."""
+        electrons, words = self.your_e[0], ""
         for i, (one, class_) in enumerate(((self.green_e, "tick"), (electrons, "orange"))):
             if np.isfinite(one):
                 below = panel.place((bar - 1 + i, np.log10(np.clip(min(one, self.full_well), 4, 1e6)))) + (0, 18)
                 words += svg.text(below, f"{float(f'{one:.3g}'):,.0f}", f"{class_} halo middle")
         return words
 
-    def _figures(self) -> str:
-        """The numbers in two columns: those of the sensor, with where they are from, and those of what it takes."""
-        (x, y, *_), figures = self._layout["numbers"], self.numbers()
-        sensor = {name: figures.pop(name) for name in ("efficiency with fill factor", "full well", "converter")}
-        body = svg.paragraph((x + 10, y + 166), _MODELS[self.model].source, 206)
-        for left, title, told in ((x + 10, "This sensor", sensor), (x + 232, "Its picture", figures)):
-            body += svg.text((left, y + 26), title, "title") + readout(told, (left, y + 50), (0, 38), (0, 17))
-        return body
+    def _figures(self, tile: str) -> str:
+        """The numbers of the sensor, with where they are from, or those of what it takes."""
+        (x, y, *_), figures = self._layout[tile], self.numbers()
+        of_sensor = {name: figures.pop(name) for name in ("efficiency with fill factor", "full well", "converter")}
+        title, told = ("This sensor", of_sensor) if tile == "sensor" else ("Its picture", figures)
+        source = svg.paragraph((x + 10, y + 166), _MODELS[self.model].source, 250) if tile == "sensor" else ""
+        return svg.text((x + 10, y + 26), title, "title") + readout(told, (x + 10, y + 50), (0, 38), (0, 17)) + source
 
 
 @lru_cache(maxsize=2)
