@@ -225,7 +225,7 @@ def test_a_view_opens_with_the_panels_that_are_asked_for_and_others_by_buttons()
     few = ReadoutView(panels="picture")
     some = few.with_panels({"time": True})
     assert [tile.name for tile in few.figure().tiles] == ["picture"]
-    assert [tile.name for tile in some.figure().tiles] == ["picture", "time"]
+    assert [tile.name for tile in some.figure().tiles] == ["picture", "time", "what happens"]
     assert few.opened == ()
     assert set(few.figure().photographs) == {"picture"}
     with pytest.raises(ValueError, match="panels must be picture and any of"):

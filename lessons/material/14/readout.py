@@ -33,17 +33,16 @@ BUCKETS = (16, 12)  # of the brigade drawn, columns and rows
 BLADES, BLADE = 5, 0.42  # of the fan: how many, and which share of its circle each fifth has
 TIP = 0.43  # of the sensor's height: how far a blade reaches from the hub
 MAINS_HZ = 50.0  # of the lamp, which is bright twice in each period
-_SIZES = {"scene": (330, 276), "picture": (330, 276), "numbers": (300, 276), "charge": (330, 276), "time": (620, 276)}
+_SIZES = {"scene": (330, 276), "picture": (330, 276), "numbers": (300, 276), "charge": (330, 276), "time": (370, 276)}
+_SIZES |= {"what happens": (260, 130)}
 """The panels in their order, and how wide and high each is in picture units."""
 _DIM = 0.16  # of what has not been read
 _FOV_DEG = 60.0
 _ROW_TICKS = [(float(row), str(row)) for row in range(0, ROWS + 1, 120)]
 _WORDS = {
     "CCD": "All rows are exposed at once, so nothing leans; then all charge passes, row by row, through one amplifier.",
-    "CMOS, global shutter": "All rows are exposed at once, so nothing leans; each keeps its charge in the dark till it "
-    "is read.",
-    "CMOS, rolling shutter": "Each row is exposed just before it is read, later than the one above it: what moves is "
-    "bent.",
+    "CMOS, global shutter": "All rows are exposed at once, so nothing leans; each waits in the dark till it is read.",
+    "CMOS, rolling shutter": "Each row is exposed just before it is read, later than the one above: what moves is bent.",
 }
 
 
@@ -160,12 +159,13 @@ class ReadoutView(View):
             "numbers": self._numbers,
             "charge": lambda: self._buckets(whole),
             "time": self._timing,
+            "what happens": self._words,
         }
         return self.tiled(self._layout, {name: draw[name]() for name in self._layout}, photographs)
 
     @cached_property
     def _layout(self) -> dict[str, Cell]:
-        return in_rows(_SIZES, self._has)
+        return in_rows(_SIZES, lambda name: self._has("time" if name == "what happens" else name))
 
     def _photo(self, name: str, title: str, size: tuple[int, int], note: str = "") -> str:
         panel = image_in(self._layout[name], name, *size)
@@ -210,12 +210,17 @@ class ReadoutView(View):
     @cached_property
     def _clock(self) -> Panel:
         left, top, *_ = self._layout["time"]
-        span = (-self.exposure_ms, 1e3 * self.frame_s + 1)
-        return plot_panel("timing", left + 64, top + 34, 306, 186, span, (ROWS, 0))
+        return plot_panel(
+            "timing", left + 64, top + 34, 296, 186, (-self.exposure_ms, 1e3 * self.frame_s + 1), (ROWS, 0)
+        )
 
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> ReadoutView:
         moved = 100 * dx / (1e3 * self.frame_s * self._clock.scale[0])
         return self.but(time=float(np.clip(self.time + moved, 0, 100)))
+
+    def _words(self) -> str:
+        x, y, *_ = self._layout["what happens"]
+        return svg.paragraph((x + 16, y + 48), self.your_row_s[1] or _WORDS[self.readout], 238, "label")
 
     def _timing(self) -> str:
         """When each row is exposed, and when it is read."""
@@ -235,18 +240,14 @@ class ReadoutView(View):
             + svg.text((panel.width - 8, 36), "read", "orange halo end")
             + self._your_line(panel)
         )
-        words = svg.paragraph((panel.x + 322, panel.y + 24), self.your_row_s[1] or _WORDS[self.readout], 222, "label")
-        return (
-            words
-            + axes(panel, "time [ms]", "row", yticks=_ROW_TICKS)
-            + panel.show(
-                content,
-                title="Each row's time",
-                hint="drag to move on",
-                drag="time",
-                label="Time of the read-out; drag or press the arrow keys",
-            )
+        shown = panel.show(
+            content,
+            title="Each row's time",
+            hint="drag to move on",
+            drag="time",
+            label="Time of the read-out; drag or press the arrow keys",
         )
+        return shown + axes(panel, "time [ms]", "row", yticks=_ROW_TICKS)
 
     def _your_line(self, panel: Panel) -> str:
         """When each row is read if the reader's row time is right."""
