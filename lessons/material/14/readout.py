@@ -42,7 +42,7 @@ _ROW_TICKS = [(float(row), str(row)) for row in range(0, ROWS + 1, 120)]
 _WORDS = {
     "CCD": "All rows are exposed at once, so nothing leans; then all charge passes, row by row, through one amplifier.",
     "CMOS, global shutter": "All rows are exposed at once, so nothing leans; each waits in the dark till it is read.",
-    "CMOS, rolling shutter": "Each row is exposed just before it is read, later than the one above: what moves is bent.",
+    "CMOS, rolling shutter": "Each row is exposed just before it is read, later than the one above: what moves bends.",
 }
 
 
