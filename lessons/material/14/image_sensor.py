@@ -41,7 +41,7 @@ _MODELS: dict[str, PublishedSensor] = {
     "CMV4000: 60 % at 550 nm": CMV4000,
 }
 _MOST_E = 100_000.0
-_BESIDE = {"electrons": (420, 276), "sensor": (270, 240), "numbers": (270, 240)}
+_BESIDE = {"electrons": (420, 296), "sensor": (270, 240), "numbers": (270, 240)}
 _SIZES = {"photograph": (460, 374), "efficiency": (500, 374)} | _BESIDE
 """The panels in their order, and how wide and high each is in picture units."""
 
@@ -221,7 +221,7 @@ class ImageSensorView(View):
             y = float(panel.place((0, np.log10(max(electrons, 1))))[1])
             content += svg.line([(0, y), (panel.width, y)], f"{class_} dashed")
             content += svg.text((panel.width - 6, y - 6), f"{name} {electrons:{form}} e⁻", f"{class_} halo end")
-        problem = svg.paragraph((x + 66, y + 252), self.your_e[1], 344) if self.yours else ""
+        problem = svg.paragraph((x + 66, y + 270), self.your_e[1], 344) if self.yours else ""
         return (
             problem
             + axes(panel, "pixels of a white wall", "electrons", xticks, yticks, aside=54)

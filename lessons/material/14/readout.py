@@ -220,7 +220,7 @@ class ReadoutView(View):
 
     def _words(self) -> str:
         x, y, *_ = self._layout["what happens"]
-        return svg.paragraph((x + 16, y + 48), self.your_row_s[1] or _WORDS[self.readout], 238, "label")
+        return svg.paragraph((x + 16, y + 30), self.your_row_s[1] or _WORDS[self.readout], 238, "label")
 
     def _timing(self) -> str:
         """When each row is exposed, and when it is read."""
