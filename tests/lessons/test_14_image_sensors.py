@@ -1,5 +1,6 @@
 """What lesson 14 says about image sensors, recomputed with NumPy, SciPy and colour-science."""
 
+import re
 from itertools import pairwise
 
 import colour
@@ -93,7 +94,7 @@ def test_the_question_about_the_fan(says):
 
 def test_no_blade_is_bent_in_the_scene(says):
     says("No blade is bent in the scene: their edges are straight. In the picture they are bent.")
-    (end,) = says("Move **time** slowly from 0 to 100 %.")
+    (end,) = says("Move **time** from 0 to 100 %.")
     assert end == ReadoutView.controls()["time"].high
     radius, angle = np.linspace(0.2, 0.8, 25)[:, None], np.radians(np.arange(0.13, 360, 0.5))
     u, v = radius * np.cos(angle), radius * np.sin(angle)
@@ -107,8 +108,65 @@ def test_no_blade_is_bent_in_the_scene(says):
 def test_nothing_bends_where_all_rows_are_exposed_at_once(says):
     says("All rows are exposed at once, and nothing bends, though the rows are still *read* one after the other.")
     for readout in ("CMOS, global shutter", "CCD"):
-        view = ReadoutView(readout=readout, time=70)
-        np.testing.assert_array_equal(view.picture(*LARGE), view.but(time=0).scene_now(*LARGE))
+        view = ReadoutView(readout=readout, time=70, exposure_ms=0.1)
+        scene, picture = (one.astype(float) for one in (view.but(time=0).scene_now(*LARGE), view.picture(*LARGE)))
+        assert np.abs(picture - scene).mean() < 2  # a fan that turns by 0.4° meanwhile
+        assert np.abs(view.but(readout="CMOS, rolling shutter").picture(*LARGE) - scene).mean() > 20
+
+
+def blades_seen(exposure_ms):
+    """How much the blades stand out: the spread of the picture's brightness around the hub, at 0.7 half heights."""
+    view = ReadoutView(exposure_ms=exposure_ms, time=100)
+    v, u = np.mgrid[: LARGE[1], : LARGE[0]] - np.array([LARGE[1] - 1, LARGE[0] - 1])[:, None, None] / 2
+    ring = np.abs(np.hypot(u, v) / (LARGE[1] / 2) - 0.7) < 0.05
+    return view.picture(*LARGE)[ring].std()
+
+
+def test_a_short_exposure_takes_the_blur_and_leaves_the_bend(says):
+    fraction, ms, short = says(
+        "Here the fan is exposed for 1/100 s, which is 10 ms. Pull **exposure** to the left, to 1 ms and on."
+    )
+    assert ms == 1000 / fraction.value
+    says("The blur goes, and the bend stays: exposure and read-out are two different times.")
+    assert blades_seen(ms.value) < 0.5 * blades_seen(short.value) < 0.6 * blades_seen(0.1)
+    bent = [ReadoutView(exposure_ms=one).numbers()["between first and last row's exposure"] for one in (10.0, 0.1)]
+    assert bent[0] == bent[1]
+    straight = ReadoutView(exposure_ms=0.1, readout="CCD").picture(*LARGE).astype(float)
+    assert np.abs(ReadoutView(exposure_ms=0.1).picture(*LARGE) - straight).mean() > 20
+
+
+def test_the_fan_s_blur_and_bend_in_pixels():
+    tip = 2 * np.pi * 12 * blade_tip_px()
+    assert f"{tip * 0.01:.0f} px in 1/100 s, {tip * 0.001:.0f} px in 1/1000 s" in printed()
+    assert f"it moves {tip * 479 * 64e-6:.0f} px from the first row's exposure" in printed()
+    said = ReadoutView(exposure_ms=10.0).numbers()
+    assert said["during one exposure"] == f"a blade's tip moves {tip * 0.01:.0f} px"
+    assert said["between first and last row's exposure"] == f"a blade's tip moves {tip * 479 * 64e-6:.0f} px"
+
+
+def test_an_exposure_of_a_whole_flash_shows_no_stripes(says):
+    (ms,) = says(
+        "Then pull **exposure** up to 10 ms. The stripes go, for each row gathers one whole flash of the lamp."
+    )
+    assert 1e-3 * ms.value == pytest.approx(1 / (2 * 50))
+    light = np.sin(2 * np.pi * 50 * (0.0123 + np.linspace(0, 1e-3 * ms.value, 1001)[:-1])) ** 2
+    assert light.mean() == pytest.approx(0.5)
+    for exposure_ms, stripes in ((ms.value, False), (1.0, True)):
+        wall = ReadoutView(subject="wall under a lamp", exposure_ms=exposure_ms).picture(*LARGE)
+        assert (np.ptp(wall[..., 1]) > 50) == stripes
+
+
+def test_the_questions_about_a_short_exposure(says):
+    said = says("A propeller looks bent in the picture of a telephone, which was exposed for 1/500 s.")
+    (shorter,) = says("An exposure of 1/5000 s.")
+    (again,) = says("Nothing but a slower propeller: the bend is its way during those 1/500 s.")
+    assert 10 * said[0].value == 10 * again.value == shorter.value
+    says("with a tenth of the exposure time and enough light")
+    says("The lean is the way of the train from the first row's moment to the last row's.")
+    views = [ReadoutView(subject="view from a train", exposure_ms=one).numbers() for one in (5.0, 0.5)]
+    blurred, sharp = (float(one["during one exposure"].split()[-2]) for one in views)
+    assert blurred == pytest.approx(10 * sharp, abs=6)
+    assert views[0]["between first and last row's exposure"] == views[1]["between first and last row's exposure"]
 
 
 def test_a_train_s_lean_tells_the_distance(says):
@@ -215,6 +273,9 @@ def test_the_question_about_the_fill_factor(says):
     assert efficiency == CMV4000_SHEET["η × fill factor"] == 100 * CMV4000.sensor.efficiency()
     assert nm == again.value == CMV4000_SHEET["nm"] == CMV4000.sensor.measured_at_nm
     right = photons.value * efficiency.value / 100
+    of, at, free = says("The dot is the sheet's figure: of 100 photons of 550 nm, 60 free an electron.")
+    assert free.value == of.value * efficiency.value / 100
+    assert at == CMV4000_SHEET["nm"]
     twice, share, whole = says("252: 42 % of 600")
     assert whole == right
     assert share == fill.value
@@ -247,7 +308,7 @@ def spectrum(name):
 
 def test_an_incandescent_bulb_leaves_little_blue_on_a_ccd_without_microlenses(says):
     name, at_400, blue, at_700, red = says(
-        "Choose the **KAF-0400**, which has no microlenses: it catches 3 photons in a hundred at 400 nm, 40 at 700 nm."
+        "The **KAF-0400** has no microlenses. It catches 3 photons in a hundred at 400 nm, 40 at 700 nm."
     )
     assert f"KAF-{name.value:04.0f}" == KAF_0400.name
     for percent, nm in ((at_400, blue), (at_700, red)):
@@ -258,6 +319,11 @@ def test_an_incandescent_bulb_leaves_little_blue_on_a_ccd_without_microlenses(sa
     assert f"KAF-{name.value:04.0f}" == KAF_0400.name
     assert at_550 == KAF_0400_CURVE[green.value]
     assert at_400 == KAF_0400_CURVE[blue.value]
+    for chosen in (
+        says("then choose **efficiency: KAF-0400: a curve**."),
+        says("Choose the **KAF-0400** and take **light** A, an incandescent bulb: what happens to blue?"),
+    ):
+        assert chosen[0] == name.value
     (times,) = says("White balance will have to multiply it by 5.5, its noise included.")
     nm, power = spectrum("A")
     filters = (
@@ -364,15 +430,25 @@ def test_the_question_about_bits(says):
 
 
 def test_more_bits_give_little(says):
-    four, three = says(
-        "Take **bits** down to 4, then 3: flat patches, and false colours where the channels step at different places."
+    saturated, most = says(
+        "This is the IMX174, a sensor by Sony, as if it were saturated at 6000 e⁻. Take **bits** down from 16, slowly"
     )
+    assert saturated.value == FULL
+    assert most == ImageSensorView.controls()["bits"].high
+    many, few, noise, step = says(
+        "From 16 bits to 10 hardly anything is lost, a quarter of a decibel: what limits the range there is the "
+        "sensor. Its noise in the dark, 6.8 e⁻, is larger than a step of the converter, 5.9 e⁻."
+    )
+    lost = db(threshold(NOISE, step_of(few.value)) / threshold(NOISE, step_of(many.value)))
+    assert lost == pytest.approx(0.25, abs=0.02)
+    assert noise == NOISE
+    assert step == step_of(few.value)
+    assert noise.value > step.value
+    four, three = says("At 4 bits, then 3, come flat patches, and false colours where the channels step at different")
     for bits in (four.value, three.value):
         assert len(np.unique(ImageSensorView(bits=bits).shot(64).raw)) <= 2**bits
-    (ten,) = says(
-        "Notice how little is gained from 10 bits on, a quarter of a decibel: what limits the range then is the sensor."
-    )
-    assert db(threshold(NOISE, step_of(ten.value)) / threshold(NOISE, step_of(16))) == pytest.approx(0.25, abs=0.02)
+    (divisor,) = says("Rounding to steps of q electrons is a noise of q/√12, and noises add as squares.")
+    assert divisor == 1 / np.linspace(-0.5, 0.5, 100_001).var()
 
 
 def test_what_six_bits_are_worth_by_the_formula(says):
@@ -486,7 +562,59 @@ def test_iso_and_dual_conversion_gain(says):
     assert after == ASI294MM_CURVE["high gain"]
 
 
-# 5: the exercises -----------------------------------------------------------------------------------------------------
+# 5: reset noise ------------------------------------------------------------------------------------------------------
+
+
+def reset_noise(microvolts, kelvin=300.0):
+    """In electrons, by the energy that heat leaves on a capacitor: ½ C ⟨V²⟩ = ½ k T; an electron makes q/C volts."""
+    capacitance = constants.e / (microvolts * 1e-6)
+    return np.sqrt(constants.k * kelvin / capacitance) / (microvolts * 1e-6)
+
+
+def test_reset_noise(says):
+    kelvin, about = says("At 300 K it is about 400 electrons for a picofarad, and it goes with the root of C.")
+    picofarad = 1e6 * constants.e / 1e-12  # µV for each electron
+    assert about.about(reset_noise(picofarad, kelvin.value), within=0.01)  # Janesick: 400 √C, in pF
+    kelvin, large, in_large, small, in_small = says(
+        "At 300 K a pixel of 30 µV per electron has 29.4 e⁻ of it, and one of 120 µV has 14.7 e⁻."
+    )
+    assert in_large == reset_noise(large.value, kelvin.value) == lesson14.reset_noise_e(large.value, kelvin.value)
+    assert in_small == reset_noise(small.value, kelvin.value)
+    says("Four times the gain is a quarter of the capacitance, and half the noise.")
+    assert small.value == 4 * large.value
+    assert in_small.value == in_large.value / 2
+    for microvolts, temperature in cases(lesson14.RESET_NOISE_E):
+        np.testing.assert_allclose(
+            lesson14.reset_noise_e(microvolts, temperature), reset_noise(np.asarray(microvolts), temperature)
+        )
+    (fixed,) = says("Your function is for 300 K only.")
+    assert fixed.value == kelvin.value
+    (volt, milli) = says("A microvolt is 1e-6 V. You took 1e-3, which is a millivolt.")
+    assert (volt.value, milli.value) == (constants.micro, constants.milli)
+    (zero,) = says("You add 273.15 once more.")
+    assert zero == constants.zero_Celsius
+
+
+def test_two_readings_take_the_reset_s_noise_away(says):
+    all_of_it, reset = says("The IMX174 has 6.8 e⁻ of noise in all. A pixel with 29 e⁻ of reset noise could never have")
+    assert all_of_it == IMX174_MEASURED["noise"]
+    assert reset == reset_noise(30)
+    assert reset.value > all_of_it.value
+    most, gain = says(
+        "Below is a photograph in dim light, at most 100 electrons a pixel, from a sensor of 30 µV per electron."
+    )
+    each, two, both = says("3 e⁻ in each of them make 3 √2 = 4.2 e⁻ in the difference.")
+    assert both == each.value * np.sqrt(two.value)
+    stored = photograph("camera")[60:260, 160:360, 0] / 255
+    light = most.value * np.where(stored > 0.04045, ((stored + 0.055) / 1.055) ** 2.4, stored / 12.92)
+    assert light.max() <= most.value
+    one_reading = np.sqrt(reset_noise(gain.value) ** 2 + each.value**2 + light.mean())
+    two_readings = np.sqrt(2 * each.value**2 + light.mean())
+    found = [float(one) for one in re.findall(r"(?:second reading|second minus first): ([\d.]+) e⁻", printed())]
+    assert found == pytest.approx([one_reading, two_readings], rel=0.03)
+
+
+# 6: the exercises -----------------------------------------------------------------------------------------------------
 
 
 def cases(exercise):
@@ -572,7 +700,7 @@ def test_what_arrives_in_its_own_packet_is_the_impulse_response_s_first_value():
         np.testing.assert_allclose(lesson14.arriving(electrons, efficiency), own, rtol=1e-9)
 
 
-# 6: what is published -------------------------------------------------------------------------------------------------
+# 7: what is published -------------------------------------------------------------------------------------------------
 
 
 def test_the_question_about_two_sheets(says):
@@ -617,6 +745,11 @@ def test_types_mix_however_the_table_is_sorted(says):
     for column in columns.values():
         types = [one.technology for one in sorted(rows, key=column)]
         assert sum(first != second for first, second in pairwise(types)) >= 2
+    says("By dynamic range the best of them is a CCD, and so is the worst. CMOS sensors lie between.")
+    stated = [one for one in rows if np.isfinite(one.stated_dynamic_range_db)]
+    in_order = [one.technology for one in sorted(stated, key=lambda one: one.stated_dynamic_range_db)]
+    assert in_order[0] == in_order[-1] == "CCD"
+    assert "CMOS" in in_order
     by_range = [one.technology for one in sorted(rows, key=columns["range"])]
     assert by_range[0] == by_range[-1] == "CCD"
     assert "CMOS" in by_range

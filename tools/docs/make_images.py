@@ -13,12 +13,12 @@ from camviz_school.views.demosaicing import DemosaicingView
 from camviz_school.views.depth_of_field import DepthOfFieldView
 from camviz_school.views.fault_lab import FaultLabView
 from camviz_school.views.fisheye import FisheyeView
-from camviz_school.views.image_sensor import ImageSensorView
 from camviz_school.views.intrinsics import IntrinsicsView
 from camviz_school.views.light_field import LightFieldView
 from camviz_school.views.noise import PhotonTransferView
 from camviz_school.views.omnidirectional import OmnidirectionalView
 from camviz_school.views.pinhole import PinholeView
+from camviz_school.views.readout import ReadoutView
 from camviz_school.views.rectification import RectificationView
 from camviz_school.views.sharpness import SharpnessView
 
@@ -40,7 +40,7 @@ PICTURES = {
     "demosaicing": DemosaicingView(panels="picture loupe"),
     "depth_of_field": DepthOfFieldView(),
     "fisheye": FisheyeView(panels="picture curves"),
-    "image_sensor": ImageSensorView(),
+    "image_sensor": ReadoutView(panels="picture", time=100),
     "light_field": LightFieldView(slope=1.04, panels="picture slice"),
     "noise": PhotonTransferView(exposure=-8.0, dark_current=0.0, panels="picture curve"),
     "omnidirectional": OmnidirectionalView(panels="doughnut window", hfov_deg=80.0),

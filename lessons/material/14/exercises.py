@@ -1,4 +1,4 @@
-"""Lesson 14, image sensors: row times from a lamp's stripes, a leaky bucket brigade, electrons from lux, decibels."""
+"""Lesson 14, image sensors: row times, decibels, a leaky bucket brigade, electrons from lux, reset noise."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from camviz_school.course.checks import SHAPES, Arguments, Array, Exercise
 PHOTONS_PER_LUX = 4091.0  # of 555 nm, per second and µm²: 1/683 W/m² over h c / λ
 
 
-# 3: electrons from lux -----------------------------------------------------------------------------------------------
+# 4: electrons from lux -----------------------------------------------------------------------------------------------
 
 
 def expected_electrons(lux: Array, f_number: float, pitch_um: float, exposure_s: float, efficiency: float) -> Array:
@@ -244,7 +244,7 @@ def gaps_between_rows(stripes, rows, mains_hz):
     return np.asarray(stripes) / (2 * mains_hz) / (rows - 1)
 
 
-# 4: find the bug in the decibels --------------------------------------------------------------------------------------
+# 2: find the bug in the decibels --------------------------------------------------------------------------------------
 
 
 def dynamic_range_db(saturation_e: Array, dark_noise_e: Array) -> Array:
@@ -366,7 +366,7 @@ def difference_for_ratio(saturation_e, dark_noise_e):
     return 20 * np.log10(np.asarray(saturation_e) - (np.asarray(dark_noise_e) + 0.5))
 
 
-# 2: what arrives in its own packet -----------------------------------------------------------------------------------
+# 3: what arrives in its own packet -----------------------------------------------------------------------------------
 
 
 def arriving(electrons: Array, efficiency: float) -> Array:
@@ -485,4 +485,99 @@ def with_the_trails(electrons, efficiency):
     return np.array(arrived)
 
 
-EXERCISES = (ROW_TIME, ARRIVING, EXPECTED_ELECTRONS, DYNAMIC_RANGE_DB)
+# 5: reset noise ------------------------------------------------------------------------------------------------------
+
+BOLTZMANN, CHARGE = 1.380649e-23, 1.602176634e-19  # J/K and C, both exact since 2019
+
+
+def reset_noise_e(uv_per_electron: Array, kelvin: Array) -> Array:
+    """√(k T C) / q electrons (...), of a capacitance C = q / gain."""
+    capacitance = CHARGE / (1e-6 * np.asarray(uv_per_electron))
+    return np.sqrt(BOLTZMANN * np.asarray(kelvin) * capacitance) / CHARGE
+
+
+def _reset_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for shape in SHAPES:
+        yield rng.uniform(20, 200, shape), float(rng.uniform(230, 340))
+    yield np.array([1.0, 60.0]), float(rng.uniform(60, 100))  # a large capacitance, and a cold sensor
+
+
+RESET_NOISE_E = Exercise(
+    name="14.reset_noise_e",
+    reference=reset_noise_e,
+    cases=_reset_cases,
+    shown=((np.array(30.0), 300.0),),
+    hints=(
+        "Two steps: first the capacitance in farads, then the noise. What is a microvolt in volts?",
+        "The conversion gain is q/C, in volts for each electron when C is in farads. Turn that round for C, and put it "
+        "into the equation above.",
+        "`capacitance = q / (1e-6 * ___)`",
+    ),
+    praise="Less capacitance, less reset noise. And two readings take away what is left of it.",
+    tolerance=1e-6,
+)
+
+
+@RESET_NOISE_E.right
+def by_the_voltage(uv_per_electron, kelvin):
+    gain = 1e-6 * np.asarray(uv_per_electron)
+    volts = np.sqrt(1.380649e-23 * kelvin * gain / 1.602176634e-19)  # √(k T / C)
+    return volts / gain
+
+
+@RESET_NOISE_E.right
+def by_the_constants_of_scipy(uv_per_electron, kelvin):
+    from scipy import constants
+
+    return np.sqrt(constants.k * kelvin / constants.e / (1e-6 * np.asarray(uv_per_electron)))
+
+
+@RESET_NOISE_E.right
+def by_the_thermal_voltage(uv_per_electron, kelvin):
+    thermal_uv = 1e6 * 1.380649e-23 * kelvin / 1.602176634e-19
+    return (thermal_uv / np.asarray(uv_per_electron)) ** 0.5
+
+
+@RESET_NOISE_E.wrong("Next to nothing: is the root there, is only k T C under it, and is it divided by the charge q?")
+def without_the_root(uv_per_electron, kelvin):
+    return BOLTZMANN * kelvin * (CHARGE / (1e-6 * np.asarray(uv_per_electron))) / CHARGE
+
+
+@RESET_NOISE_E.wrong("This is the noise in volts, √(k T / C). One electron makes q/C volts: divide by that.")
+def in_volts(uv_per_electron, kelvin):
+    return 1e-6 * np.asarray(uv_per_electron) * reset_noise_e(uv_per_electron, kelvin)
+
+
+@RESET_NOISE_E.wrong("This is the noise in microvolts. Divide by the µV that one electron makes.")
+def in_microvolts(uv_per_electron, kelvin):
+    return np.asarray(uv_per_electron) * reset_noise_e(uv_per_electron, kelvin)
+
+
+@RESET_NOISE_E.wrong(
+    "The gain is in *micro*volts. In volts it is a millionth, and the capacitance a million times yours."
+)
+def microvolts_taken_for_volts(uv_per_electron, kelvin):
+    return reset_noise_e(1e6 * np.asarray(uv_per_electron), kelvin)
+
+
+@RESET_NOISE_E.wrong("A microvolt is 1e-6 V. You took 1e-3, which is a millivolt.")
+def microvolts_taken_for_millivolts(uv_per_electron, kelvin):
+    return reset_noise_e(1e3 * np.asarray(uv_per_electron), kelvin)
+
+
+@RESET_NOISE_E.wrong("You have the gain where the capacitance belongs. The gain is q/C, so C is q divided by it.")
+def gain_for_capacitance(uv_per_electron, kelvin):
+    return np.sqrt(BOLTZMANN * kelvin * 1e-6 * np.asarray(uv_per_electron)) / CHARGE
+
+
+@RESET_NOISE_E.wrong("The temperature is in kelvin already, as its name says. You add 273.15 once more.")
+def celsius_taken(uv_per_electron, kelvin):
+    return reset_noise_e(uv_per_electron, np.asarray(kelvin) + 273.15)
+
+
+@RESET_NOISE_E.wrong("Your function is for 300 K only. Use `kelvin`: a cooled sensor has less.")
+def at_room_temperature(uv_per_electron, kelvin):
+    return reset_noise_e(uv_per_electron, 300.0)
+
+
+EXERCISES = (ROW_TIME, DYNAMIC_RANGE_DB, ARRIVING, EXPECTED_ELECTRONS, RESET_NOISE_E)

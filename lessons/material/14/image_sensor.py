@@ -5,7 +5,7 @@ A reader's own count of electrons in green light can stand beside the right one.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar
@@ -16,8 +16,8 @@ from scipy import constants
 from camviz.cameras import Camera, Intrinsics
 from camviz.colour.spectra import ILLUMINANTS, WAVELENGTHS_NM, illuminant, sensitivities
 from camviz.draw import svg
-from camviz.draw.flow import rows
-from camviz.draw.panel import Panel, image_panel, placed_image
+from camviz.draw.flow import Cell
+from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import axes, bars, between, curve, grid, legend, logarithmic, plot_panel
 from camviz.draw.readout import listed, readout
@@ -27,6 +27,7 @@ from camviz.sensors import DigitalCamera, Sensor, decibel
 from camviz.sensors.digital_camera import Shot
 from camviz.sensors.published import CMV4000, IMX174, KAF_0400, PublishedSensor
 from camviz.views.base import View, answered, choice, positive, slider
+from camviz_school.views.readout import in_rows
 
 SMALL, LARGE = 160, 320  # pixels across a draft and a fine picture
 SCENE_LUX = 1000.0
@@ -40,9 +41,9 @@ _MODELS: dict[str, PublishedSensor] = {
     "CMV4000: 60 % at 550 nm": CMV4000,
 }
 _MOST_E = 100_000.0
-_LAYOUT = rows(
-    (374, {"photograph": 460, "quantum efficiency": 500}), (240, {"electrons": 420, "sensor": 270, "picture": 270})
-)
+_BESIDE = {"electrons": (420, 296), "sensor": (270, 240), "numbers": (270, 240)}
+_SIZES = {"photograph": (460, 374), "efficiency": (500, 374)} | _BESIDE
+"""The panels in their order, and how wide and high each is in picture units."""
 
 
 @dataclass(frozen=True)
@@ -54,11 +55,13 @@ class ImageSensorView(View):
     published figure includes. Pitch and read noise are the published sensor's too. The gain is such that the converter
     ends just where the well is full, so the full well is the saturation capacity here. It opens as the IMX174 does.
 
-    With `green` there are two more bars: an unfiltered pixel under green light of 555 nm, and the same by `yours`, a
-    reader's function of lux on the wall, f-number, pitch in µm, exposure in s and efficiency.
+    `panels` names what is drawn: any of photograph, efficiency, electrons, sensor and numbers. With `yours`, a
+    reader's function of lux on the wall, f-number, pitch in µm, exposure in s and efficiency, there are two more bars:
+    an unfiltered pixel under green light of 555 nm, and the same by that function.
     """
 
     title: ClassVar[str] = "Image sensor"
+    openable: ClassVar[Mapping[str, str]] = {name: name for name in _SIZES}
 
     model: str = choice(*_MODELS, label="efficiency", help="a published quantum efficiency, pitch and read noise")
     light: str = choice("D65", *(one for one in ILLUMINANTS if one != "D65"), help="a CIE illuminant")
@@ -70,12 +73,14 @@ class ImageSensorView(View):
         32_700.0, 300.0, _MOST_E, 100.0, label="full well", unit="e⁻", help="what a pixel can hold"
     )
     bits: float = slider(16.0, 2.0, 16.0, 1.0, unit="bits", help="of the converter")
-    green: bool = False
+    panels: str = "photograph efficiency electrons sensor numbers"
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         positive(self, "exposure_ms")
+        if not set(self.panels.split()) <= {*_SIZES}:
+            raise ValueError(f"panels must be any of {', '.join(_SIZES)}, got {self.panels!r}")
 
     # What is true ----------------------------------------------------------------------------------------------------
 
@@ -106,22 +111,22 @@ class ImageSensorView(View):
         lux = camera.scene_lux * camera.transmittance / (4 * camera.f_number**2)
         return camera.channels.electrons * lux * camera.pitch_um**2 * self.exposure_ms / 1000
 
+    @property
+    def _in_green(self) -> tuple[float, ...]:
+        """What a reader's function is given, all in green light of 555 nm."""
+        efficiency = float(self.sensor.efficiency(GREEN_NM))
+        return SCENE_LUX, F_NUMBER, _MODELS[self.model].pitch_um, self.exposure_ms / 1000, efficiency
+
     @cached_property
     def green_e(self) -> float:
         """Electrons that the same white wall frees in an unfiltered pixel under green light of 555 nm."""
-        lux, efficiency, pitch_um = SCENE_LUX / (4 * F_NUMBER**2), self._efficiency, _MODELS[self.model].pitch_um
-        return float(efficiency * PHOTONS_PER_LUX * lux * pitch_um**2 * self.exposure_ms / 1000)
-
-    @property
-    def _efficiency(self) -> float:
-        """Electrons per photon of 555 nm, the fill factor included."""
-        return float(self.sensor.efficiency(GREEN_NM))
+        lux, f_number, pitch_um, exposure_s, efficiency = self._in_green
+        return efficiency * PHOTONS_PER_LUX * lux / (4 * f_number**2) * pitch_um**2 * exposure_s
 
     @cached_property
     def your_e(self) -> tuple[float, str]:
         """The same by the reader's function, NaN without an answer, and what is wrong with it."""
-        pitch_um, exposure_s = _MODELS[self.model].pitch_um, self.exposure_ms / 1000
-        answer, problem = answered(self.yours, (SCENE_LUX, F_NUMBER, pitch_um, exposure_s, self._efficiency), 0.0)
+        answer, problem = answered(self.yours, self._in_green, 0.0)
         return float(answer), problem
 
     def numbers(self) -> dict[str, str]:
@@ -149,15 +154,28 @@ class ImageSensorView(View):
     # The picture -----------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        width = SMALL if draft else LARGE
-        picture = self.shot(width).picture
-        panel = image_panel("picture", 10, 34, 440, width, width * 3 // 4)
-        shown = panel.show(placed_image(panel, "picture", width, width * 3 // 4), title="What becomes of it")
-        parts = {"photograph": shown, "quantum efficiency": self._spectra(), "electrons": self._electrons()}
-        return self.tiled(_LAYOUT, parts | self._blocks(), {"picture": jpeg(picture, 92)})
+        width, photographs = SMALL if draft else LARGE, dict[str, bytes]()
+        draw: dict[str, Callable[[], str]] = {
+            "photograph": lambda: self._photograph(width, photographs),
+            "efficiency": self._spectra,
+            "electrons": self._electrons,
+            "sensor": lambda: self._figures("sensor"),
+            "numbers": lambda: self._figures("numbers"),
+        }
+        return self.tiled(self._layout, {name: draw[name]() for name in self._layout}, photographs)
+
+    def _photograph(self, width: int, photographs: dict[str, bytes]) -> str:
+        photographs["photograph"] = jpeg(self.shot(width).picture, 92)
+        panel = image_in(self._layout["photograph"], "photograph", width, width * 3 // 4)
+        return panel.show(placed_image(panel, panel.name, width, width * 3 // 4), title="What becomes of it")
+
+    @cached_property
+    def _layout(self) -> dict[str, Cell]:
+        return in_rows(_SIZES, self._has)
 
     def _spectra(self) -> str:
-        panel = plot_panel("efficiency", 524, 34, 426, 290, (380, 780), (0, 100))
+        left, top, *_ = self._layout["efficiency"]
+        panel = plot_panel("efficiency", left + 64, top + 34, 426, 290, (380, 780), (0, 100))
         unfiltered = 100 * np.asarray(self.sensor.efficiency(WAVELENGTHS_NM))
         per_photon = sensitivities("Nikon D5100") / WAVELENGTHS_NM[:, None]
         passed = per_photon / per_photon.max(axis=0)
@@ -181,10 +199,11 @@ class ImageSensorView(View):
         low, high = 0.0, float(np.log10(3 * _MOST_E))
         freed = dict(zip(("red", "green", "blue", "ink"), self.white_e, strict=True))
         names = ["red", "green", "blue", "no filter"]
-        if self.green:
+        if self.yours:
             freed |= {"muted": self.green_e, "orange": self.your_e[0]}
             names += ["555 nm", "yours"]
-        panel = plot_panel("electrons", 66, 408, 344, 156, (0.4, len(names) + 1.9), (low, high))
+        x, y, *_ = self._layout["electrons"]
+        panel = plot_panel("electrons", x + 66, y + 34, 344, 156, (0.4, len(names) + 1.9), (low, high))
         yticks = logarithmic(low, high)
         xticks = [(i + 1.0, name) for i, name in enumerate(names)]
         content = grid(panel, xticks=[], yticks=yticks)
@@ -195,40 +214,36 @@ class ImageSensorView(View):
                 continue
             content += bars(panel, left, right, top[:1], f"{class_} dotted")
             content += "".join(bars(panel, left, right, top[1:], c) for c in (f"wash fill-{class_}", class_))
-        content += self._in_words(panel, len(names))
+        content += self._in_words(panel, len(names)) if self.yours else ""
         floor_e = self.sensor.threshold_photons() * float(self.sensor.efficiency())
-        content += self._level(panel, self.full_well, f"full well {self.full_well:,.0f} e⁻", "orange", -6)
-        content += self._level(panel, floor_e, f"threshold {floor_e:.1f} e⁻", "purple", -6)
-        return axes(panel, "pixels of a white wall", "electrons", xticks, yticks, aside=54) + panel.show(
-            content, title="Electrons in a pixel", note=f"{self.exposure_ms:g} ms, f/4, {SCENE_LUX:g} lux"
+        ends = (("full well", ",.0f", self.full_well, "orange"), ("threshold", ".1f", floor_e, "purple"))
+        for name, form, electrons, class_ in ends:
+            y = float(panel.place((0, np.log10(max(electrons, 1))))[1])
+            content += svg.line([(0, y), (panel.width, y)], f"{class_} dashed")
+            content += svg.text((panel.width - 6, y - 6), f"{name} {electrons:{form}} e⁻", f"{class_} halo end")
+        problem = svg.paragraph((x + 66, y + 270), self.your_e[1], 344) if self.yours else ""
+        return (
+            problem
+            + axes(panel, "pixels of a white wall", "electrons", xticks, yticks, aside=54)
+            + panel.show(content, title="Electrons in a pixel", note=f"{self.exposure_ms:g} ms, f/4, {SCENE_LUX:g} lux")
         )
 
     def _in_words(self, panel: Panel, bar: int) -> str:
-        """The two counts in green light above their bars, or what is in the way of the reader's."""
-        if not self.green:
-            return ""
-        electrons, problem = self.your_e
-        words = svg.paragraph((14, 46), problem, panel.width - 28, "note halo") if problem else ""
+        """The two counts in green light in their bars."""
+        electrons, words = self.your_e[0], ""
         for i, (one, class_) in enumerate(((self.green_e, "tick"), (electrons, "orange"))):
             if np.isfinite(one):
                 below = panel.place((bar - 1 + i, np.log10(np.clip(min(one, self.full_well), 4, 1e6)))) + (0, 18)
                 words += svg.text(below, f"{float(f'{one:.3g}'):,.0f}", f"{class_} halo middle")
         return words
 
-    def _level(self, panel: Panel, electrons: float, words: str, class_: str, above: float) -> str:
-        y = float(panel.place((0, np.log10(max(electrons, 1))))[1])
-        line = svg.line([(0, y), (panel.width, y)], f"{class_} dashed")
-        return line + svg.text((panel.width - 6, y + above), words, f"{class_} halo end")
-
-    def _blocks(self) -> dict[str, str]:
-        """The numbers in two tiles: those of the sensor, with where they are from, and those of what it takes."""
-        figures, step, below = self.numbers(), (0, 38), (0, 17)
-        sensor = {name: figures.pop(name) for name in ("efficiency with fill factor", "full well", "converter")}
-        source = svg.paragraph((430, 540), _MODELS[self.model].source, 250)
-        return {
-            "sensor": svg.text((430, 400), "This sensor", "title") + readout(sensor, (430, 424), step, below) + source,
-            "picture": svg.text((700, 400), "Its picture", "title") + readout(figures, (700, 424), step, below),
-        }
+    def _figures(self, tile: str) -> str:
+        """The numbers of the sensor, with where they are from, or those of what it takes."""
+        (x, y, *_), figures = self._layout[tile], self.numbers()
+        of_sensor = {name: figures.pop(name) for name in ("efficiency with fill factor", "full well", "converter")}
+        title, told = ("This sensor", of_sensor) if tile == "sensor" else ("Its picture", figures)
+        source = svg.paragraph((x + 10, y + 166), _MODELS[self.model].source, 250) if tile == "sensor" else ""
+        return svg.text((x + 10, y + 26), title, "title") + readout(told, (x + 10, y + 50), (0, 38), (0, 17)) + source
 
 
 @lru_cache(maxsize=2)
