@@ -414,115 +414,7 @@ def dead_only_where_equal(frame, dark, flat):
     return (frame - dark) * np.nanmean(answer) / answer
 
 
-# 4: find the bug in the decibels --------------------------------------------------------------------------------------
-
-
-def dynamic_range_db(saturation: Array, dark_noise: Array) -> Array:
-    """20 log10 of saturation over the threshold σ_d + ½, all in electrons (...)."""
-    return 20 * np.log10(saturation / (dark_noise + 0.5))
-
-
-def dynamic_range_as_given(saturation, dark_noise):
-    return 20 * np.log(saturation / (dark_noise + 0.5))
-
-
-def _decibel_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    for shape in SHAPES:
-        yield (rng.uniform(3_000, 90_000, shape), rng.uniform(2, 30, shape))
-    noise = rng.uniform(2, 30, 3)
-    yield (np.array([0.1, 1, 1000]) * (noise + 0.5), noise)  # below the threshold, at it, and 60 dB above
-    yield (np.array([3000.0, 9000.0]), np.array([0.0, 0.7]))  # without any noise the threshold is ½
-
-
-DECIBELS = Exercise(
-    name="15.dynamic_range_db",
-    reference=dynamic_range_db,
-    cases=_decibel_cases,
-    as_given=dynamic_range_as_given,
-    shown=((13_973.0, 10.95),),
-    hints=(
-        "Put in a ratio whose decibels you know: saturation 1000 times the threshold is 60 dB. What comes out?",
-        "Every answer is too large by one and the same factor. Which logarithm has that value, and which base "
-        "does the decibel want?",
-        "`return 20 * np.___(saturation / (dark_noise + 0.5))`",
-    ),
-    praise="Common logarithms. The published result file of a reference data set has this very bug in it.",
-)
-
-
-@DECIBELS.right
-def levels_subtracted(saturation, dark_noise):
-    return 20 * (np.log10(saturation) - np.log10(dark_noise + 0.5))
-
-
-@DECIBELS.right
-def natural_over_ln_10(saturation, dark_noise):
-    return 20 * np.log(saturation / (dark_noise + 0.5)) / np.log(10)
-
-
-@DECIBELS.right
-def as_a_ratio_of_powers(saturation, dark_noise):
-    return 10 * np.log10((saturation / (dark_noise + 0.5)) ** 2)
-
-
-@DECIBELS.wrong("Ten is for ratios of power. EMVA 1288 counts a ratio of signals, with 20.")
-def ten_for_twenty(saturation, dark_noise):
-    return 10 * np.log10(saturation / (dark_noise + 0.5))
-
-
-@DECIBELS.wrong("You halved the 20 and left the logarithm as it was. The answers are smaller now, and no more right.")
-def ten_with_the_natural_logarithm(saturation, dark_noise):
-    return 10 * np.log(saturation / (dark_noise + 0.5))
-
-
-@DECIBELS.wrong("This is the exponent of ten, in bels of signal. A decibel is a twentieth of it: keep the 20.")
-def without_the_twenty(saturation, dark_noise):
-    return np.log10(saturation / (dark_noise + 0.5))
-
-
-@DECIBELS.wrong("With log2 you count stops (bits), here twenty times. Decibels take the common logarithm.")
-def twenty_times_stops(saturation, dark_noise):
-    return 20 * np.log2(saturation / (dark_noise + 0.5))
-
-
-@DECIBELS.wrong("These are stops: how often the signal can be halved. The question is in decibels.")
-def stops(saturation, dark_noise):
-    return np.log2(saturation / (dark_noise + 0.5))
-
-
-@DECIBELS.wrong("The logarithm is right. But the threshold, where signal equals noise, is σ_d + ½: keep the ½.")
-def over_the_noise(saturation, dark_noise):
-    return 20 * np.log10(saturation / dark_noise)
-
-
-@DECIBELS.wrong(
-    "That is the exact threshold, ½ + √(σ² + ¼). It is better physics, but the file that is to be mended took σ_d + ½."
-)
-def over_the_exact_threshold(saturation, dark_noise):
-    return 20 * np.log10(saturation / (0.5 + np.sqrt(dark_noise**2 + 0.25)))
-
-
-@DECIBELS.wrong("Without its brackets the ½ is added to the *ratio*: `a / b + 0.5` divides first.")
-def half_added_to_the_ratio(saturation, dark_noise):
-    return 20 * np.log10(saturation / dark_noise + 0.5)
-
-
-@DECIBELS.wrong("The ratio is upside down: it says by how much the threshold lies *below* saturation.")
-def upside_down(saturation, dark_noise):
-    return 20 * np.log10((dark_noise + 0.5) / saturation)
-
-
-@DECIBELS.wrong("A quotient of two logarithms is a logarithm to another base. The logarithm of a quotient is meant.")
-def quotient_of_logarithms(saturation, dark_noise):
-    return 20 * np.log10(saturation) / np.log10(dark_noise + 0.5)
-
-
-@DECIBELS.wrong("You *multiplied* by ln 10. The natural logarithm is too large by that factor already: divide.")
-def multiplied_by_ln_10(saturation, dark_noise):
-    return 20 * np.log(saturation / (dark_noise + 0.5)) * np.log(10)
-
-
-# 5: merge a bracket ---------------------------------------------------------------------------------------------------
+# 4: merge a bracket ---------------------------------------------------------------------------------------------------
 
 
 def merge(electrons: Array, exposures: Array, dark_noise: float, full_well: float) -> Array:
@@ -738,7 +630,7 @@ def the_longest_alone(electrons, exposures, dark_noise, full_well):
     return np.where(usable.any(axis=0), best, np.nan)
 
 
-# 6: what rows and columns share ---------------------------------------------------------------------------------------
+# 5: what rows and columns share ---------------------------------------------------------------------------------------
 
 
 def stripes(frame: Array) -> Array:
@@ -871,7 +763,7 @@ def within_rows_and_columns(frame):
     return np.array([of_rows - pixels / width, of_columns - pixels / height, pixels])
 
 
-# 7: the least light that can be measured ------------------------------------------------------------------------------
+# 6: the least light that can be measured ------------------------------------------------------------------------------
 
 
 def threshold_photons(dark_noise: Array, efficiency: float) -> Array:
@@ -975,4 +867,4 @@ def dark_noise_in_photons(dark_noise, efficiency):
     return 0.5 + np.sqrt((dark_noise / efficiency) ** 2 + 0.25)
 
 
-EXERCISES = (NOISE, GAIN, FLAT_FIELD, DECIBELS, MERGE, STRIPES, THRESHOLD)
+EXERCISES = (NOISE, GAIN, FLAT_FIELD, MERGE, STRIPES, THRESHOLD)
