@@ -209,7 +209,7 @@ def test_the_matrix_brings_the_mean_down_and_leaves_grey(says):
     assert patches == len(CHART)
     assert before == delta(raw * gains, truth).mean()
     assert after == delta((raw * gains) @ matrix.T, truth).mean()
-    (nearly,) = says('A matrix made the colours nearly right, and "nearly" was a mean ΔE of 0.96.')
+    (nearly,) = says("Gains and a matrix left a mean ΔE of 0.96 on the chart.")
     assert nearly.value == after.value
     says("It leaves a perfect grey as it is: each of its rows adds up to 1.")
     np.testing.assert_allclose(matrix @ np.ones(3), 1, atol=1e-9)
@@ -677,7 +677,7 @@ def test_between_two_matrices(says):
     for name, kelvin in {"A": body, "D65": day}.items():
         uv = colour.xy_to_UCS_uv(colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"][name])
         assert kelvin.about(colour.temperature.uv_to_CCT_Ohno2013(uv)[0], 0.001)  # A: 2855.5 by the constants of today
-    low, high, shown = says("Below 2856 K and above 6504 K it stays at 1 or at 0. For 4000 K:")
+    (low, high), (shown,) = says("Below 2856 K and above 6504 K it stays at 1 or at 0."), says("For 4000 K:")
     assert [low.value, high.value] == [body.value, day.value]
     bulb_s, day_s, below, above, again = (
         says("What share of the warm matrix is needed at 2856 K, and what share at 6504 K?")

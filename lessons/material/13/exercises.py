@@ -704,7 +704,7 @@ def share_alone(kelvin, warm, cold):
     return np.clip((1 / kelvin - 1 / 6504) / (1 / 2856 - 1 / 6504), 0, 1)
 
 
-@BETWEEN.wrong("You mix the *inverses* of the matrices. A raw file's matrices are mixed as they are.")
+@BETWEEN.wrong("You mix the *inverses* of the matrices. Mix the matrices as they are given.")
 def inverses_mixed(kelvin, warm, cold):
     return np.linalg.inv(between(kelvin, np.linalg.inv(warm), np.linalg.inv(cold)))
 
