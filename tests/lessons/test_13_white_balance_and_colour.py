@@ -530,7 +530,7 @@ def test_metamers_are_equal_to_the_sensor_and_far_apart_to_the_eye(says):
     ):
         raw = counted(other, NIKON, twins)
         assert np.abs(raw[0] - raw[1]).max() > 0.003
-    says("and no such surface is found for it")
+    says("No such surface is found for it.")
     np.testing.assert_allclose(*view.but(camera="CIE observer").reflectances, atol=1e-9)
     sixteen, eight = says("More bits: with 16 in place of 8 the numbers would differ.")
     for bits in (sixteen.value, eight.value):

@@ -32,9 +32,9 @@ LAMPS = {"fluorescent, white": "FL2", "fluorescent, three bands": "FL11", "white
 _STEPS = ("counted (raw)", "× gains", "× matrix", "what the eye sees")
 _SPECTRA = ("light", "surface", "sensor")
 _SIZES = {
-    **{"chart": (410, 334), "photograph": (330, 300), "your chart": (410, 334), "your photograph": (330, 300)},
+    **{"chart": (410, 326), "photograph": (330, 256), "your chart": (410, 326), "your photograph": (330, 256)},
     **dict.fromkeys(_SPECTRA, (320, 220)),
-    **{"steps": (540, 220), "figures": (220, 256)},
+    **{"steps": (300, 304), "figures": (220, 256)},
 }
 """The tiles in their order, and how wide and how tall each is in picture units."""
 PARTS = ("develop", "gains", "matrix")
@@ -309,7 +309,7 @@ class ColourView(View):
         return panel.show(shown, **heading) + self._key(panel, self.errors)
 
     def _key(self, panel: Panel, off: np.ndarray) -> str:
-        key = f"Upper left: the camera. Lower right: your eye.\nNumber: ΔE2000, {off.mean():.2f} on average"
+        key = f"Above: camera. Below: your eye.\nNumber: ΔE2000, {off.mean():.2f} on average"
         return svg.paragraph((panel.x, panel.y + panel.height + 18), key, panel.width)
 
     def _photograph_panel(self, photographs: dict[str, bytes], draft: bool, name: str) -> str:

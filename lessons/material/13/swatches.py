@@ -40,17 +40,18 @@ def chart(panel: Panel, rgb: np.ndarray, true_xyz: np.ndarray, errors: np.ndarra
 
 
 def steps(cell: Cell, colours: Mapping[str, np.ndarray]) -> str:
-    """Two by two swatches, linear sRGB (1 or 2, 3) each: a step's colour or two, with its name and its numbers."""
+    """Swatches below each other, linear sRGB (1 or 2, 3) each: a step's colour or two, its name and its numbers."""
     parts = []
     for at, (name, rgb) in enumerate(colours.items()):
-        left, y, width = cell[0] + 10 + 270 * (at % 2), cell[1] + 8 + 106 * (at // 2), 96 / len(rgb)
-        parts.append(svg.text((left + 106, y + 24), name, "label"))
+        left, y, width = cell[0] + 10, cell[1] + 8 + 74 * at, 100 / len(rgb)
+        parts.append(svg.text((left + 114, y + 18), name, "label"))
         for k, (fill, colour) in enumerate(zip(hexadecimal(rgb), rgb, strict=True)):
-            parts.append(svg.rectangle(left + k * width, y, width, 96, "patch", style=f"fill:{fill}"))
+            crisp = f"fill:{fill};shape-rendering:crispEdges"  # no seam between halves that are alike
+            parts.append(svg.rectangle(left + k * width, y, width, 66, "patch", style=crisp))
             words = " ".join(f"{value:.3f}" for value in colour).replace("-", "−")
             class_ = ("blue", "orange")[k] if len(rgb) > 1 else ""
-            parts.append(svg.text((left + 106, y + 52 + 22 * k), words, f"number {class_}"))
-        parts.append(svg.rectangle(left, y, 96, 96, "frame"))
+            parts.append(svg.text((left + 114, y + 39 + 20 * k), words, f"number {class_}"))
+        parts.append(svg.rectangle(left, y, 100, 66, "frame"))
     return "".join(parts)
 
 
