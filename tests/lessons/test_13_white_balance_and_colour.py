@@ -807,11 +807,11 @@ def above(question):
     ("question", "words"),
     [
         ("13.white", r"greys come right|chosen patch,|pale|needs a matrix"),
-        ("13.grey_world", r"bluish|turns \*blue|scene=|\.mean\(axis"),
+        ("13.grey_world", r"brown|turns \*blue|scene=|\.mean\(axis"),
         ("13.tint", r"not enough|two dimensions|is one number|green side|beside the line"),
         ("13.gamma", r"encoded as a rule|linear values|\*\*linear|before the balance"),
         ("13.metamer", r"no matrix|cannot be told|twin|Luther|below about"),
-        ("13.infrared", r"IR-cut|fade|near infrared"),
+        ("13.infrared", r"IR-cut|fade towards|near infrared"),
     ],
 )
 def test_nothing_above_a_question_answers_it(question, words):
