@@ -32,7 +32,7 @@ LAMPS = {"fluorescent, white": "FL2", "fluorescent, three bands": "FL11", "white
 _STEPS = ("counted (raw)", "× gains", "× matrix", "what the eye sees")
 _SPECTRA = ("light", "surface", "sensor")
 _SIZES = {
-    **{"chart": (410, 326), "photograph": (330, 256), "your chart": (410, 326), "your photograph": (330, 256)},
+    **{"chart": (410, 332), "photograph": (330, 256), "your chart": (410, 332), "your photograph": (330, 256)},
     **dict.fromkeys(_SPECTRA, (320, 220)),
     **{"steps": (300, 304), "figures": (220, 256)},
 }
