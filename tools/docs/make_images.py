@@ -36,7 +36,7 @@ PICTURES = {
     "calibration": CalibrationView(tilt=2.0, picked=3, panels="picture fit"),
     "epipolar": EpipolarView(right_x=0.15, right_z=0.9, yaw=0.0, depth=3.0, panels="right epipoles"),
     "rectification": RectificationView(),
-    "colour": ColourView(),
+    "colour": ColourView(matrix="off", patch=18, panels="chart"),
     "demosaicing": DemosaicingView(panels="picture loupe"),
     "depth_of_field": DepthOfFieldView(),
     "fisheye": FisheyeView(panels="picture curves"),

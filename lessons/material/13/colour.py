@@ -5,9 +5,9 @@ A reader's own balance, matrix or development can make a second chart and a seco
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Any, ClassVar
 
 import cv2
@@ -18,34 +18,28 @@ from camviz.colour.developing import CameraInLight, developed, errors, in_daylig
 from camviz.colour.spaces import chromaticity, to_srgb, tristimulus
 from camviz.colour.temperature import temperature, xy_of_temperature
 from camviz.draw import plot, svg
-from camviz.draw.flow import rows, shortened
+from camviz.draw.flow import WIDTH, Cell, rows, shortened
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, true_minus
 from camviz.scenes.light import to_display, to_linear
 from camviz.scenes.photographs import photograph
 from camviz.views.base import Control, View, answered, choice, one_of, slider, switch, without
-from camviz.views.yours import tried
+from camviz.views.yours import faded, is_unwritten, tried
 from camviz_school.views import swatches
 
 LAMPS = {"fluorescent, white": "FL2", "fluorescent, three bands": "FL11", "white LED": "LED-B3"}
-_CHART = (334, {"chart": 410, "photograph": 330, "numbers": 220})
 _STEPS = ("counted (raw)", "× gains", "× matrix", "what the eye sees")
-LAYOUTS = {
-    "chart photograph": shortened(rows(_CHART), numbers=220, photograph=300),
-    "spectra chart photograph steps": shortened(
-        rows(_CHART, (220, {"light": 320, "surface": 320, "sensor": 320}), (74, dict.fromkeys(_STEPS, 240))),
-        photograph=300,
-    ),
-    "chart photograph yours": shortened(
-        rows(_CHART, (300, {"your chart": 410, "your photograph": 330, "your numbers": 220})),
-        **{"numbers": 220, "photograph": 300, "your numbers": 80},
-    ),
+_SPECTRA = ("light", "surface", "sensor")
+_SIZES = {
+    **{"chart": (410, 332), "photograph": (330, 256), "your chart": (410, 332), "your photograph": (330, 256)},
+    **dict.fromkeys(_SPECTRA, (320, 220)),
+    **{"steps": (300, 304), "figures": (220, 256)},
 }
-"""What is drawn, and where."""
+"""The tiles in their order, and how wide and how tall each is in picture units."""
 PARTS = ("develop", "gains", "matrix")
 _DRAFT, _FINE = 208, 416  # pixels on the photograph's longer side
-_COLUMN = 750  # where the numbers begin
+_TWIN_OF_K = 5000.0  # the daylight in which the metamer counts what its patch counts
 
 
 @dataclass(frozen=True)
@@ -54,7 +48,8 @@ class ColourView(View):
 
     `patch` (0 … 23) is the one chosen on the chart. The photograph's surfaces are the smoothest that look like it in
     daylight; with `picture` (height, width, 3) uint8 sRGB it is the reader's own. The automatic balances judge by the
-    photograph, as a camera does. `panels` is one of LAYOUTS.
+    photograph, as a camera does. `panels` names what is drawn: any of chart, photograph, yours (a second one of each),
+    spectra or the surface's alone, steps, and figures.
 
     `yours` is a reader's function, and `part` says which part of the development it takes over: "develop", from raw
     colours (..., 3), gains (3,) and matrix (3, 3) to colours encoded by the power 1/2.2; "gains", from the photograph's
@@ -63,7 +58,9 @@ class ColourView(View):
     """
 
     title: ClassVar[str] = "White balance and colour"
-    layouts = LAYOUTS
+    openable: ClassVar[Mapping[str, str]] = {
+        **{"chart": "chart", "photograph": "photograph", "spectra": "spectra", "steps": "steps", "figures": "numbers"}
+    }
 
     light: str = choice("Planckian", "daylight", *LAMPS, help="what shines: a glowing body, the sky, or a lamp")
     kelvin: float = slider(
@@ -78,12 +75,12 @@ class ColourView(View):
     set_tint: float = slider(0.0, -0.03, 0.03, 0.001, label="set tint (Duv)", help="for balance by hand")
     matrix: str = choice("for this light", "for daylight", "off", help="3 × 3, fitted to the chart")
     gamma: str = choice("at the end", "before the balance", help="where the screen's curve is applied")
-    metamer: bool = switch(False, help="a second surface that the sensor cannot tell from the chosen patch")
+    metamer: bool = switch(False, help="a second surface, which daylight of 5000 K does not tell from the patch")
     scene: str = choice(
         "coffee", "astronaut", "chelsea", "rocket", label="photograph", help="what stands beside the chart"
     )
     patch: int = 13
-    panels: str = "spectra chart photograph steps"
+    panels: str = "chart photograph spectra steps figures"
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
     part: str = "develop"
     picture: np.ndarray | None = field(default=None, compare=False, repr=False)
@@ -93,6 +90,8 @@ class ColourView(View):
         if isinstance(self.patch, bool) or self.patch not in range(24):
             raise ValueError(f"patch must be a whole number 0 … 23, got {self.patch!r}")
         one_of("part", self.part, PARTS)
+        for name in self.panels.split() or [""]:
+            one_of("panels", name, ("chart", "photograph", "yours", "spectra", "surface", "steps", "figures"))
 
     def offered(self) -> dict[str, Control]:
         """Daylight begins at 4000 K."""
@@ -159,7 +158,8 @@ class ColourView(View):
         chosen = spectra.reflectances()[self.patch]
         if not self.metamer:
             return chosen[None]
-        counted, eye = (self.power[:, None] * s for s in (self.shot.sensitivity, spectra.observer()))
+        daylight = spectra.daylight(_TWIN_OF_K)[:, None]
+        counted, eye = (daylight * s for s in (self.shot.sensitivity, spectra.observer()))
         return np.stack([chosen, balance.metamer(chosen, counted, eye)])
 
     def _surfaces(self, side: int) -> np.ndarray:
@@ -190,22 +190,14 @@ class ColourView(View):
             matrix, problem = tried(self.yours, (balanced, target), matrix)
         return developed(raw, gains, matrix, encoded=self.gamma != "at the end"), problem
 
-    def _your_row(self, draft: bool) -> tuple[dict[str, str], dict[str, bytes]]:
-        """The chart and the photograph by the reader's function, below those above."""
-        rgb, problem = self.your_chart
-        panel = replace(self._chart_panel, name="your chart", y=_CHART[0] + 34)
+    def _your_chart(self) -> str:
+        """The chart by the reader's function, or the right one, greyed, or what is wrong."""
+        (rgb, problem), panel, title = self.your_chart, self._chart_panel("your chart"), "With your function"
         if problem:
-            return {"your chart": without(panel, problem, "With your function", (16, 30))}, {}
+            awaited = swatches.chart(panel, self.chart, self.shot.true_chart, self.errors, self.patch)
+            return without(panel, problem, title, (16, 30), awaited)
         shown = swatches.chart(panel, rgb, self.shot.true_chart, self._off(rgb), self.patch)
-        surfaces = self._surfaces(_DRAFT if draft else _FINE)
-        image = to_display(self.your_way(surfaces @ self.shot.raw_from_srgb.T)[0])
-        figure = {"mean ΔE2000, yours": f"{self._off(rgb).mean():.2f}"}
-        parts = {
-            "your chart": panel.show(shown, title="With your function"),
-            "your photograph": self._photograph_panel(image, "your photograph"),
-            "your numbers": readout(figure, (_COLUMN, panel.y + 14), (0, 0), (0, 18)),
-        }
-        return parts, {"your photograph": jpeg(image)}
+        return panel.show(shown, title=title) + self._key(panel, self._off(rgb))
 
     def _off(self, rgb: np.ndarray) -> np.ndarray:
         """ΔE2000 (24,) of a chart; no number where there is no colour."""
@@ -216,9 +208,8 @@ class ColourView(View):
     def numbers(self) -> dict[str, str]:
         """The state's key figures, as text."""
         kelvin, duv = temperature(chromaticity(tristimulus(self.power)))
-        unlike = true_minus(f"{kelvin:.0f} K, Duv {duv:+.4f}") if np.isfinite(kelvin) else "no temperature"
         return {
-            "light": unlike,
+            "light": true_minus(f"{kelvin:.0f} K, Duv {duv:+.4f}") if np.isfinite(kelvin) else "no temperature",
             "gains": " ".join(f"{name} {gain:.2f}" for name, gain in zip("RGB", self.gains, strict=True)),
             "mean ΔE2000": f"{self.errors.mean():.2f}",
             "largest ΔE2000": f"{self.errors.max():.2f}, {spectra.patch_names()[self.errors.argmax()]}",
@@ -227,41 +218,50 @@ class ColourView(View):
 
     def _told(self) -> dict[str, str]:
         figures = self.numbers()
-        if "steps" in self.panels:
-            return figures
-        return {name: figures[name] for name in ("light", "gains", "mean ΔE2000", "largest ΔE2000")}
+        return figures if self._has("steps") else {name: figures[name] for name in list(figures)[:4]}
 
     def _metamer_in_words(self) -> dict[str, str]:
         if not self.metamer:
             return {}
         one, other = (balance.seen(self.power, each) for each in self.reflectances)
-        apart = float(errors(to_srgb(one), other))
-        return {"its metamer": f"eye ΔE {apart:.1f}, sensor 0" if apart > 1e-6 else "none: it is an eye"}
+        apart, counted = float(errors(to_srgb(one), other)), np.ptp(self.shot.raw(self.reflectances), axis=0).max()
+        unlike = f"{counted:.3f}" if counted > 1e-9 else "0"
+        return {"its metamer": f"eye ΔE {apart:.1f}, sensor {unlike}" if apart > 1e-6 else "none: it is an eye"}
 
     def description(self) -> str:
-        figures = listed(self._told())
-        words = f"{self.camera} in {self._light_in_words()}, white balance {self.method}, matrix {self.matrix}"
-        return f"{words}, gamma {self.gamma}: {figures}."
-
-    def _light_in_words(self) -> str:
         kind = f"{self.light} light" if self.light == "Planckian" else self.light
-        return true_minus(f"{kind} with tint {self.tint:+.2f}") if self.tint else kind
+        lit = true_minus(f"{kind} with tint {self.tint:+.2f}") if self.tint else kind
+        words = f"{self.camera} in {lit}, white balance {self.method}, matrix {self.matrix}, gamma {self.gamma}"
+        return f"{words}: {listed(self._told())}."
 
     # The picture ------------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        image = self.image(draft=draft)
-        parts = {"chart": self._chart(), "photograph": self._photograph_panel(image), "numbers": self._numbers_column()}
-        photographs = {"photograph": jpeg(image)}
-        if self._has("spectra"):
-            parts |= {"light": self._light_panel(), "surface": self._surface_panel(), "sensor": self._sensor_panel()}
-        if self._has("yours"):
-            below, attached = self._your_row(draft)
-            parts |= below
-            photographs |= attached
-        if self._has("steps"):
-            parts |= self._steps()
-        return self.tiled(LAYOUTS[self.panels], parts, photographs)
+        photographs: dict[str, bytes] = {}
+        photograph = partial(self._photograph_panel, photographs, draft)
+        draw: dict[str, Callable[[], str]] = {
+            "chart": self._chart, "your chart": self._your_chart, "steps": self._steps, "figures": self._figures,
+            "light": self._light_panel, "surface": self._surface_panel, "sensor": self._sensor_panel,
+            "photograph": partial(photograph, "photograph"), "your photograph": partial(photograph, "your photograph"),
+        }  # fmt: skip
+        return self.tiled(self._layout, {name: draw[name]() for name in self._layout}, photographs)
+
+    @cached_property
+    def _layout(self) -> dict[str, Cell]:
+        """As many tiles in a row as it has room for, in their order; a reader's own below those above them."""
+        wanted = set(self.panels.split())
+        if "yours" in wanted:
+            wanted |= {f"your {name}" for name in ("chart", "photograph") if name in wanted}
+        if "spectra" in wanted:
+            wanted |= {*_SPECTRA}
+        lines: list[dict[str, float]] = [{}]
+        for name, (width, _) in _SIZES.items():
+            if name in wanted:
+                if sum(lines[-1].values()) + width > WIDTH:
+                    lines.append({})
+                lines[-1][name] = width
+        heights = {name: tall for name, (_, tall) in _SIZES.items()}
+        return shortened(rows(*((max(heights[name] for name in line), line) for line in lines)), **heights)
 
     def image(self, *, draft: bool) -> np.ndarray:
         """The photograph as developed, uint8 sRGB."""
@@ -272,14 +272,14 @@ class ColourView(View):
         return np.clip(encoded + 0.5, 0, 255).astype(np.uint8)
 
     def _light_panel(self) -> str:
-        panel = _spectrum_panel("light", 60, 108)
+        panel = self._spectrum_panel("light", 108)
         lines = plot.grid(panel) + plot.curve(panel, spectra.WAVELENGTHS_NM, self.power, "ink")
         strip = swatches.rainbow(panel, self.power)
         note = self.light if self.light in LAMPS else ""
         return plot.axes(panel, "wavelength in nm", "power") + panel.show(strip + lines, title="The light", note=note)
 
     def _surface_panel(self) -> str:
-        panel = _spectrum_panel("surface", 380, 1.05)
+        panel = self._spectrum_panel("surface", 1.05)
         curves = zip(self.reflectances, ("blue", "orange dashed"), strict=False)
         lines = [plot.curve(panel, spectra.WAVELENGTHS_NM, one, class_) for one, class_ in curves]
         note = "dashed: its metamer" if self.metamer else spectra.patch_names()[self.patch]
@@ -288,59 +288,62 @@ class ColourView(View):
         return plot.axes(panel, "wavelength in nm", "reflected") + panel.show(content, title=title, note=note)
 
     def _sensor_panel(self) -> str:
-        tall = 1.9 if self.camera == "CIE observer" else 1.1
-        panel = _spectrum_panel("sensor", 700, tall)
-        lines = [
-            plot.curve(panel, spectra.WAVELENGTHS_NM, channel, class_)
-            for channel, class_ in zip(self.shot.sensitivity.T, ("red thick", "green dashed", "blue"), strict=True)
-        ]
-        content = plot.grid(panel) + "".join(lines)
-        return plot.axes(panel, "wavelength in nm", "sensitivity") + panel.show(
-            content, title="× a sensor", note=self.camera
-        )
+        panel = self._spectrum_panel("sensor", 1.9 if self.camera == "CIE observer" else 1.1)
+        channels = zip(self.shot.sensitivity.T, ("red thick", "green dashed", "blue"), strict=True)
+        content = "".join(plot.curve(panel, spectra.WAVELENGTHS_NM, one, class_) for one, class_ in channels)
+        shown = panel.show(plot.grid(panel) + content, title="× a sensor", note=self.camera)
+        return plot.axes(panel, "wavelength in nm", "sensitivity") + shown
 
-    @property
-    def _chart_panel(self) -> Panel:
-        return Panel("chart", 10, 34, 390, 252, 0, 6, 0, 4)
+    def _spectrum_panel(self, name: str, top: float) -> Panel:
+        x, y, *_ = self._layout[name]
+        return plot.plot_panel(name, x + 60, y + 34, 250, 136, (380, 780), (0, top))
+
+    def _chart_panel(self, name: str = "chart") -> Panel:
+        x, y, *_ = self._layout[name]
+        return Panel(name, x + 10, y + 34, 390, 252, 0, 6, 0, 4)
 
     def _chart(self) -> str:
-        panel = self._chart_panel
-        shown = panel.show(
-            swatches.chart(panel, self.chart, self.shot.true_chart, self.errors, self.patch),
-            title="The chart",
-            hint="click a patch",
-            drag="chart",
-            label="Choose a patch of the chart: click it or press the arrow keys",
-        )
-        key = "Upper left: the camera; lower right: the truth.\nNumber: ΔE2000"
-        return shown + svg.paragraph((panel.x, panel.y + panel.height + 18), key, panel.width)
+        panel, label = self._chart_panel(), "Choose a patch of the chart: click it or press the arrow keys"
+        shown = swatches.chart(panel, self.chart, self.shot.true_chart, self.errors, self.patch)
+        heading = {"title": "The chart", "hint": "click a patch", "drag": "chart", "label": label}
+        return panel.show(shown, **heading) + self._key(panel, self.errors)
 
-    def _photograph_panel(self, image: np.ndarray, name: str = "photograph") -> str:
+    def _key(self, panel: Panel, off: np.ndarray) -> str:
+        key = f"Above: camera. Below: your eye.\nNumber: ΔE2000, {off.mean():.2f} on average"
+        return svg.paragraph((panel.x, panel.y + panel.height + 18), key, panel.width)
+
+    def _photograph_panel(self, photographs: dict[str, bytes], draft: bool, name: str) -> str:
+        """A photograph, which goes to those attached: the reader's own, or the right one, greyed, where it waits."""
+        image, title = self.image(draft=draft), "Developed in the same way"
+        if name != "photograph":
+            raw = self._surfaces(_DRAFT if draft else _FINE) @ self.shot.raw_from_srgb.T
+            (rgb, problem), title = self.your_way(raw), "With your function"
+            if problem and not is_unwritten(problem):
+                return ""
+            image = faded(image) if problem else to_display(rgb)
+        photographs[name] = jpeg(image)
         height, width = image.shape[:2]
-        panel = image_in(LAYOUTS[self.panels][name], name, width, height)
-        return panel.show(placed_image(panel, name, width, height), title="Developed in the same way")
+        panel = image_in(self._layout[name], name, width, height)
+        return panel.show(placed_image(panel, name, width, height), title=title)
 
-    def _numbers_column(self) -> str:
-        figures = readout(self._told(), (_COLUMN, 52), (0, 46), (0, 18))
-        return svg.text((_COLUMN, 26), "In numbers", "title") + figures
+    def _figures(self) -> str:
+        x, y = self._layout["figures"][0] + 10, self._layout["figures"][1]
+        return svg.text((x, y + 26), "In numbers", "title") + readout(self._told(), (x, y + 48), (0, 36), (0, 17))
 
-    def _steps(self) -> dict[str, str]:
+    def _steps(self) -> str:
         """The chosen patch on its way through: a colour and its numbers for each step."""
         raw = self.shot.raw(self.reflectances)
         seen = to_srgb(balance.seen(self.power, self.reflectances))
-        if self.gamma == "at the end":
-            balanced = raw * self.gains
-        else:
-            balanced = developed(raw, self.gains, np.eye(3), encoded=True)
+        balanced = developed(raw, self.gains, np.eye(3), encoded=self.gamma != "at the end")
         steps = dict(zip(_STEPS, (raw, balanced, self.develop(raw), seen), strict=True))
-        return swatches.steps(LAYOUTS[self.panels], steps)
+        return swatches.steps(self._layout["steps"], steps)
 
     # The hand ---------------------------------------------------------------------------------------------------------
 
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> ColourView:
         if handle != "chart":
             return self
-        panel = self._chart_panel
+        panel = self._chart_panel()
         if np.isnan(x):
             return self._moved(int(np.sign(dx)), int(np.sign(dy)))
         column, row = np.clip(np.floor(panel.data((x - panel.x, y - panel.y))), 0, (5, 3)).astype(int)
@@ -349,10 +352,6 @@ class ColourView(View):
     def _moved(self, right: int, down: int) -> ColourView:
         row, column = divmod(self.patch, 6)
         return self.but(patch=6 * min(max(row + down, 0), 3) + min(max(column + right, 0), 5))
-
-
-def _spectrum_panel(name: str, x: float, top: float) -> Panel:
-    return plot.plot_panel(name, x, 368, 250, 136, (380, 780), (0, top))
 
 
 @lru_cache(maxsize=2)  # a draft and a fine one

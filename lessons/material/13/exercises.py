@@ -1,4 +1,4 @@
-"""Lesson 13, white balance and colour: the response, grey world, developing with a bug in it, the matrix, and metamers.
+"""Lesson 13, white balance and colour: the response, developing with a bug in it, metamers, matrices, and grey world.
 
 Raw colours (..., 3) are linear; a matrix acts on columns, so an array of colours is `rgb @ M.T`.
 """
@@ -141,7 +141,7 @@ def one_surface_only(light, reflectance, sensitivity):
     return sensitivity.T @ (light * reflectance) / (light @ sensitivity)
 
 
-# 2: grey world -------------------------------------------------------------------------------------------------------
+# 5: grey world -------------------------------------------------------------------------------------------------------
 
 
 def grey_world(raw: Array) -> Array:
@@ -256,7 +256,7 @@ def first_axis_only(raw):
     return mean[..., 1:2] / mean
 
 
-# 4: find the bug in developing ---------------------------------------------------------------------------------------
+# 2: find the bug in developing ---------------------------------------------------------------------------------------
 
 
 def develop(raw: Array, gains: Array, matrix: Array) -> Array:
@@ -376,7 +376,7 @@ def without_gains(raw, gains, matrix):
     return np.clip(raw @ matrix.T, 0, 1) ** (1 / 2.2)
 
 
-# 3: the matrix -------------------------------------------------------------------------------------------------------
+# 4: the matrix -------------------------------------------------------------------------------------------------------
 
 
 def fit_matrix(raw: Array, target: Array) -> Array:
@@ -488,7 +488,7 @@ def from_the_mean_colour(raw, target):
     return np.diag(target.mean(axis=0) / raw.mean(axis=0))
 
 
-# 5: what the sensor is blind to --------------------------------------------------------------------------------------
+# 3: what the sensor is blind to --------------------------------------------------------------------------------------
 
 
 def unseen(change: Array, sensor: Array) -> Array:
@@ -610,4 +610,109 @@ def weights_alone(change, sensor):
     return np.linalg.solve(sensor.T @ sensor, sensor.T @ change)
 
 
-EXERCISES = (RESPONSE, GREY_WORLD, FIT_MATRIX, DEVELOP, UNSEEN)
+# 6: between two matrices ---------------------------------------------------------------------------------------------
+
+BULB_K, DAYLIGHT_K = 2856, 6504
+"""The temperatures of the CIE's illuminant A and of D65."""
+
+
+def between(kelvin: float, warm: Array, cold: Array) -> Array:
+    """The mixture of two matrices, linear in 1/kelvin, and no farther than either of them."""
+    share = np.clip((1 / kelvin - 1 / 6504) / (1 / 2856 - 1 / 6504), 0, 1)
+    return np.asarray(share * warm + (1 - share) * cold, dtype=np.float64)
+
+
+def _between_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    inside = rng.uniform(2900, 6400, 4)
+    for kelvin in (*inside, BULB_K, DAYLIGHT_K, rng.uniform(1800, 2700), rng.uniform(6700, 12000)):
+        yield float(kelvin), *(np.eye(3) + rng.uniform(-0.6, 0.6, (3, 3)) for _ in range(2))
+
+
+BETWEEN = Exercise(
+    name="13.between",
+    reference=between,
+    cases=_between_cases,
+    hints=(
+        "What share of the warm matrix is needed at 2856 K, and what share at 6504 K? In between, the share goes "
+        "evenly with 1/kelvin. Below 2856 K and above 6504 K it stays where it is.",
+        "A number goes evenly from 0 at b to 1 at a as `(x - b) / (a - b)`. Here x is `1 / kelvin`. `np.clip` holds "
+        "the share between 0 and 1.",
+        "`share = np.clip((1 / kelvin - 1 / ___) / (1 / ___ - 1 / ___), 0, 1)`, and then "
+        "`return share * ___ + (1 - share) * ___`",
+    ),
+    praise="Programs that read DNG files do just this, with the temperature that they take for that of the light.",
+)
+
+
+@BETWEEN.right
+def by_interpolating_each_entry(kelvin, warm, cold):
+    known = np.stack([cold, warm]).reshape(2, 9).T
+    return np.array([np.interp(1 / kelvin, [1 / 6504, 1 / 2856], pair) for pair in known]).reshape(3, 3)
+
+
+@BETWEEN.right
+def by_holding_the_temperature(kelvin, warm, cold):
+    held = min(max(kelvin, 2856), 6504)
+    share = (1e6 / held - 1e6 / 6504) / (1e6 / 2856 - 1e6 / 6504)
+    return cold + share * (warm - cold)
+
+
+@BETWEEN.right
+def by_cases(kelvin, warm, cold):
+    if kelvin <= 2856:
+        return warm
+    if kelvin >= 6504:
+        return cold
+    return (warm * 2856 * (6504 - kelvin) + cold * 6504 * (kelvin - 2856)) / (kelvin * (6504 - 2856))
+
+
+@BETWEEN.wrong("Your share goes evenly with the temperature itself. It is to go evenly with *one divided by* it.")
+def evenly_with_temperature(kelvin, warm, cold):
+    share = np.clip((6504 - kelvin) / (6504 - 2856), 0, 1)
+    return share * warm + (1 - share) * cold
+
+
+@BETWEEN.wrong("Between the two lights this is right. Beyond them the share is to stay: hold it between 0 and 1.")
+def goes_on_beyond(kelvin, warm, cold):
+    share = (1 / kelvin - 1 / 6504) / (1 / 2856 - 1 / 6504)
+    return share * warm + (1 - share) * cold
+
+
+@BETWEEN.wrong("The two matrices have changed places: at 2856 K the *warm* one is right.")
+def places_changed(kelvin, warm, cold):
+    return between(kelvin, cold, warm)
+
+
+@BETWEEN.wrong("You take the nearer of the two matrices. Between the lights it is to be a mixture of both.")
+def the_nearer_one(kelvin, warm, cold):
+    return warm if 1 / kelvin > (1 / 2856 + 1 / 6504) / 2 else cold
+
+
+@BETWEEN.wrong("You take the mean of the two whatever the light is. How much of each is needed depends on it.")
+def always_the_mean(kelvin, warm, cold):
+    return (warm + cold) / 2
+
+
+@BETWEEN.wrong("You add both with shares that do not make 1 together: where one has s, the other needs 1 − s.")
+def shares_do_not_make_one(kelvin, warm, cold):
+    share = np.clip((1 / kelvin - 1 / 6504) / (1 / 2856 - 1 / 6504), 0, 1)
+    return share * warm + cold
+
+
+@BETWEEN.wrong("This is the share of the warm matrix. Mix the two matrices with it.")
+def share_alone(kelvin, warm, cold):
+    return np.clip((1 / kelvin - 1 / 6504) / (1 / 2856 - 1 / 6504), 0, 1)
+
+
+@BETWEEN.wrong("You mix the *inverses* of the matrices. Mix the matrices as they are given.")
+def inverses_mixed(kelvin, warm, cold):
+    return np.linalg.inv(between(kelvin, np.linalg.inv(warm), np.linalg.inv(cold)))
+
+
+@BETWEEN.wrong("Your share goes evenly with the *logarithm* of the temperature. It is to go evenly with 1/kelvin.")
+def evenly_with_the_logarithm(kelvin, warm, cold):
+    share = np.clip(np.log(6504 / kelvin) / np.log(6504 / 2856), 0, 1)
+    return share * warm + (1 - share) * cold
+
+
+EXERCISES = (RESPONSE, DEVELOP, UNSEEN, FIT_MATRIX, GREY_WORLD, BETWEEN)

@@ -39,20 +39,20 @@ def chart(panel: Panel, rgb: np.ndarray, true_xyz: np.ndarray, errors: np.ndarra
     )
 
 
-def steps(layout: Mapping[str, Cell], colours: Mapping[str, np.ndarray]) -> dict[str, str]:
-    """A tile for each step, linear sRGB (1 or 2, 3): one or two swatches with its name and its numbers."""
-    tiles = {}
-    for name, rgb in colours.items():
-        left, y = layout[name][0] + 10, layout[name][1] + 4
-        parts = [svg.text((left + 70, y + 13), name, "label")]
-        width = 60 / len(rgb)
+def steps(cell: Cell, colours: Mapping[str, np.ndarray]) -> str:
+    """Swatches below each other, linear sRGB (1 or 2, 3) each: a step's colour or two, its name and its numbers."""
+    parts = []
+    for at, (name, rgb) in enumerate(colours.items()):
+        left, y, width = cell[0] + 10, cell[1] + 8 + 74 * at, 100 / len(rgb)
+        parts.append(svg.text((left + 114, y + 18), name, "label"))
         for k, (fill, colour) in enumerate(zip(hexadecimal(rgb), rgb, strict=True)):
-            parts.append(svg.rectangle(left + k * width, y, width, 60, "patch", style=f"fill:{fill}"))
+            crisp = f"fill:{fill};shape-rendering:crispEdges"  # no seam between halves that are alike
+            parts.append(svg.rectangle(left + k * width, y, width, 66, "patch", style=crisp))
             words = " ".join(f"{value:.3f}" for value in colour).replace("-", "−")
             class_ = ("blue", "orange")[k] if len(rgb) > 1 else ""
-            parts.append(svg.text((left + 70, y + 35 + 19 * k), words, f"number {class_}"))
-        tiles[name] = "".join(parts) + svg.rectangle(left, y, 60, 60, "frame")
-    return tiles
+            parts.append(svg.text((left + 114, y + 39 + 20 * k), words, f"number {class_}"))
+        parts.append(svg.rectangle(left, y, 100, 66, "frame"))
+    return "".join(parts)
 
 
 def rainbow(panel: Panel, power: np.ndarray) -> str:
