@@ -275,7 +275,7 @@ def test_a_mistake_is_what_the_lesson_draws_with_it_and_one_that_shows_nothing_i
     mistakes.value_of(sources[4], after := dict(names))
     shown = mistakes.value_of(sources[5], dict(after))
     before = {3: names, 4: names, 5: after}
-    found = list(islice(mistakes.mistakes("01.project", 3, 5, sources, before, shown), 4))
+    found = list(islice(mistakes.mistakes("01.project", 3, 5, sources, before, [shown]), 4))
     titles = {known.function.__name__.replace("_", " "): known for known in project.misconceptions}
     assert {"divided by the distance", "upside down fraction"} <= {one.title for one in found}
     for one in found:
@@ -284,10 +284,12 @@ def test_a_mistake_is_what_the_lesson_draws_with_it_and_one_that_shows_nothing_i
     assert after["view"].yours is project.reference
     (first, *_) = project.misconceptions
     itself = explore(PinholeView(panels="picture yours", yours=first.function), "depth_mm")
-    others = mistakes.mistakes("01.project", 3, 5, sources, before, itself)
+    others = mistakes.mistakes("01.project", 3, 5, sources, before, [itself])
     assert found[0].explanation == first.explanation
     assert next(others).explanation == found[1].explanation
-    assert list(mistakes.mistakes("01.project", 3, 5, {5: "explore(PinholeView())"}, before, shown)) == []
+    told = [shown, found[0].explorer]  # what another exercise's mistake shows already is not shown again
+    assert next(mistakes.mistakes("01.project", 3, 5, sources, before, told)).title == found[1].title
+    assert list(mistakes.mistakes("01.project", 3, 5, {5: "explore(PinholeView())"}, before, [shown])) == []
 
 
 def test_a_pane_with_mistakes_shows_the_solution_first_and_says_so():

@@ -77,12 +77,17 @@ def dependents(sources: Mapping[int, str], begin: int, end: int, name: str) -> l
 
 
 def mistakes(
-    exercise: str, stub: int, pane: int, sources: Mapping[int, str], before: Mapping[int, dict[str, Any]], shown: Any
+    exercise: str,
+    stub: int,
+    pane: int,
+    sources: Mapping[int, str],
+    before: Mapping[int, dict[str, Any]],
+    shown: list[Any],
 ) -> Iterator[Mistake]:
-    """Usual mistakes in an exercise that the visualizer of the cell `pane` shows.
+    """Usual mistakes in an exercise that the visualizer of the cell `pane` shows, each by a picture of its own.
 
     `stub` is the exercise's cell, `before` the names before each cell of a run with the solutions, and `shown` the
-    visualizer that came out.
+    visualizer that came out, and those of mistakes that are known already.
     """
     from camviz.widgets import Explorer
     from camviz_school.course.exercises import exercises
@@ -91,12 +96,13 @@ def mistakes(
     again = dependents(sources, stub, pane, name)
     if pane not in again:
         return
-    right = _picture(shown)
+    pictures = list(map(_picture, shown))
     for known in exercises(exercise.split(".")[0])[exercise].misconceptions:
         names = {**before[pane], **{key: before[stub][key] for key in _set_by(again, sources) & before[stub].keys()}}
         names[name] = known.function
         value = [value_of(sources[number], names) for number in again][-1]
-        if isinstance(value, Explorer) and _picture(value) != right:
+        if isinstance(value, Explorer) and (picture := _picture(value)) not in pictures:
+            pictures.append(picture)
             yield Mistake(known.function.__name__.replace("_", " "), known.explanation, value)
 
 

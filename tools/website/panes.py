@@ -180,8 +180,11 @@ def _mistaken(
     solved: dict[str, int], pane: int, cells: dict[int, CodeCell], before: dict[int, dict[str, Any]], explorer: Any
 ) -> list[Mistake]:
     sources = {number: cell.source for number, cell in cells.items()}
-    found = (mistakes(exercise, stub, pane, sources, before, explorer) for exercise, stub in solved.items())
-    return [mistake for each in found for mistake in islice(each, MOST)]
+    kept: list[Mistake] = []
+    for exercise, stub in solved.items():
+        shown = [explorer, *(one.explorer for one in kept)]
+        kept += islice(mistakes(exercise, stub, pane, sources, before, shown), MOST)
+    return kept
 
 
 def _recorded(explorer: Any, together: tuple[str, ...], recorder: Recorder, budget: Budget) -> Any:
