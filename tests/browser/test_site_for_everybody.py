@@ -56,7 +56,7 @@ def found_by_axe(page: Page) -> list[str]:
     return page.evaluate(AXE)
 
 
-@pytest.mark.parametrize("part", range(PARTS))
+@pytest.mark.parametrize("part", [0, *(pytest.param(i, marks=pytest.mark.thorough) for i in range(1, PARTS))])
 def test_axe_finds_no_fault_on_any_page(page: Page, address: str, part: int) -> None:
     found = {}
     for way in ways(generated=False)[part::PARTS]:
@@ -76,6 +76,7 @@ def test_axe_finds_no_fault_on_the_page_of_any_name(page: Page, address: str) ->
     assert found == []
 
 
+@pytest.mark.thorough
 def test_axe_finds_no_fault_on_any_lesson_in_the_dark(page: Page, address: str) -> None:
     page.emulate_media(color_scheme="dark")
     found = {}
