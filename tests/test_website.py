@@ -7,6 +7,7 @@ import sys
 from html import unescape
 from itertools import islice, pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import nbformat
 import numpy as np
@@ -290,6 +291,18 @@ def test_a_mistake_is_what_the_lesson_draws_with_it_and_one_that_shows_nothing_i
     told = [shown, found[0].explorer]  # what another exercise's mistake shows already is not shown again
     assert next(mistakes.mistakes("01.project", 3, 5, sources, before, told)).title == found[1].title
     assert list(mistakes.mistakes("01.project", 3, 5, {5: "explore(PinholeView())"}, before, [shown])) == []
+
+
+def test_two_mistakes_that_draw_one_picture_are_shown_once(monkeypatch):
+    project = exercises("01")["01.project"]
+    first, second, *_ = project.misconceptions
+    alike = SimpleNamespace(misconceptions=[first, first, second])
+    monkeypatch.setattr("camviz_school.course.exercises.exercises", lambda lesson: {"01.project": alike})
+    names = {"PinholeView": PinholeView, "explore": explore, "project": project.reference}
+    sources = {5: "explore(PinholeView(panels='picture yours', yours=project), 'depth_mm')"}
+    shown = mistakes.value_of(sources[5], dict(names))
+    found = mistakes.mistakes("01.project", 3, 5, sources, {3: names, 5: names}, [shown])
+    assert [one.explanation for one in found] == [first.explanation, second.explanation]
 
 
 def test_a_pane_with_mistakes_shows_the_solution_first_and_says_so():

@@ -1,4 +1,4 @@
-"""Every lesson in a real JupyterLab: it runs, every control changes the picture, nothing raises, in light and dark."""
+"""Lessons in a real JupyterLab (all with --all): they run, controls change the picture, nothing raises, light and dark."""
 
 import re
 
