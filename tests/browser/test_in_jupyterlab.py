@@ -1,4 +1,4 @@
-"""Lessons in a real JupyterLab, all with --all: they run, controls change the picture, nothing raises, in both themes."""
+"""Lessons in a real JupyterLab, all with --all: they run, controls change the picture, nothing raises."""
 
 import re
 
