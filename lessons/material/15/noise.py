@@ -275,7 +275,7 @@ class PhotonTransferView(View):
         """Logarithmic axes that do not move with the gain: an electron at gain 1 is always in the same place."""
         one = 0.97 * 2**self.bits / FULL_WELL_E
         across, up = (log10(0.6 * one), log10(1.3 * 2**self.bits)), (log10(0.4 * one), log10(0.12 * 2**self.bits))
-        return plot.plot_panel("transfer", *self._corner("curve", 64, 34), 362, 226, across, up)
+        return plot.plot_panel("transfer", *self._corner("curve", 64, 34), 338, 226, across, up)
 
     def _transfer_panel(self, pixels: int) -> str:
         panel = self._plot
@@ -324,8 +324,8 @@ class PhotonTransferView(View):
         named = [(class_, f"{name} (slope {slope})") for (class_, slope), name in drawn]
         named += [("orange thick", "yours")] if self.yours else []
         lines = plot.legend(self._plot, [("ink", "all together"), *named])
-        x, y = self._corner("curve", 430, 34)
-        return svg.element("svg", lines, x=x, y=y, width=190, height=226)
+        x, y = self._corner("curve", 406, 34)
+        return svg.element("svg", lines, x=x, y=y, width=214, height=226)
 
     def _points(self, panel: Panel, pixels: int) -> str:
         """What frames of the card say, and the exposure of the picture."""
