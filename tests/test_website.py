@@ -4,6 +4,7 @@ import inspect
 import json
 import re
 import sys
+from dataclasses import replace
 from html import unescape
 from itertools import islice, pairwise
 from pathlib import Path
@@ -25,6 +26,8 @@ import mistakes  # noqa: E402
 import panes  # noqa: E402
 import pictures  # noqa: E402
 import slim_styles  # noqa: E402
+from beside import beside  # noqa: E402
+from course_pages import course_pages, learn  # noqa: E402
 from lesson_page import LessonPage, asked_by, exercise_html  # noqa: E402
 from links import on_site  # noqa: E402
 from scripts import question_script  # noqa: E402
@@ -32,6 +35,7 @@ from scripts import question_script  # noqa: E402
 from camviz.twoview import ransac_fundamental  # noqa: E402
 from camviz.views.frustum import FrustumView  # noqa: E402
 from camviz.widgets import explore  # noqa: E402
+from camviz_school.course.catalogue import catalogue  # noqa: E402
 from camviz_school.course.exercises import exercises  # noqa: E402
 from camviz_school.course.glossary import glossary  # noqa: E402
 from camviz_school.course.material import lesson_paths  # noqa: E402
@@ -58,20 +62,24 @@ def html_of(cell) -> str:
     return "".join(output.get("data", {}).get("text/html", "") for output in cell.get("outputs", []))
 
 
+def code(notebook):
+    return [cell for cell in notebook.cells if cell.cell_type == "code"]
+
+
 def test_a_page_has_the_cells_of_its_notebook_word_for_word(pair) -> None:
     lesson, page, _ = pair
-    assert len(lesson.cells) == len(page.cells)
-    for cell, shown in zip(lesson.cells, page.cells, strict=True):
-        if cell.cell_type == "code":
-            assert shown.source == cell.source
-        else:
-            assert words(shown.source) == words(cell.source)
+    assert [cell.source for cell in code(page)] == [cell.source for cell in code(lesson)]
+    shown, written = (
+        [word for cell in one.cells if cell.cell_type != "code" for word in words(cell.source)]
+        for one in (page, lesson)
+    )
+    assert shown == written
 
 
 def test_a_page_has_every_picture_of_its_notebook_with_its_words_as_a_file(pair) -> None:
     lesson, page, made = pair
-    for cell, shown in zip(lesson.cells, page.cells, strict=True):
-        if cell.cell_type == "markdown" or asked_by(cell.source):
+    for cell, shown in zip(code(lesson), code(page), strict=True):
+        if asked_by(cell.source):
             continue
         html = html_of(shown)
         assert "data:image" not in html
@@ -80,10 +88,52 @@ def test_a_page_has_every_picture_of_its_notebook_with_its_words_as_a_file(pair)
             assert (made.site / "_pictures" / name).stat().st_size > 100
 
 
+def grouped(*cells):
+    """What `beside` makes, a group in brackets: "# a" is a heading, P a pane, ? a prediction, x an exercise."""
+    kinds = {"P": "pane", "?": "asked", "x": "other"}
+    made = [
+        nbformat.v4.new_code_cell(one) if one in kinds else nbformat.v4.new_markdown_cell(one.replace("|", "\n\n"))
+        for one in cells
+    ]
+    shown = beside(made, lambda cell: kinds.get(cell.source, "said"))
+    return " ".join({'<div class="camviz-beside">': "[", "</div>": "]"}.get(cell.source, cell.source) for cell in shown)
+
+
+def test_a_pane_stands_beside_the_sentences_before_and_after_it():
+    assert grouped("# One|a", "P", "b", "x") == "# One [ a P b ] x"
+    assert grouped("# One|a|## Two|b", "P", "c|# Three") == "# One|a|## Two [ b P c ] # Three".replace("|", "\n\n")
+
+
+def test_a_prediction_and_the_last_text_before_a_pane_lead_to_it():
+    assert grouped("P", "a", "?", "b", "P", "c") == "[ P a ] [ ? b P c ]"
+    assert grouped("P", "a", "?", "P") == "[ P a ] [ ? P ]"
+    assert grouped("P", "P", "a") == "P [ P a ]"
+
+
+def test_sentences_without_a_pane_and_a_pane_without_sentences_have_the_whole_width():
+    assert grouped("# One|a", "x", "b", "x", "P", "x") == "# One a x b x P x"
+
+
+def test_every_lesson_stands_on_the_map_once(tmp_path: Path):
+    lessons = catalogue()
+    unknown = replace(lessons[0], number="98")
+    mapped = learn([*lessons, unknown], {})
+    numbers = re.findall(r'class="lesson-number">(\d\d)', mapped)
+    assert sorted(numbers) == sorted([*(one.number for one in lessons), "98"])
+    assert mapped.index('">98<') > mapped.index("Electives")
+
+
+def test_the_map_shows_the_first_panel_that_a_lesson_shows(tmp_path: Path):
+    shown = course_pages(tmp_path / "_pictures")["learn.md"]
+    pictures = re.findall(r'<img src="(_pictures/[^"]+)"', shown)
+    assert len(pictures) == len(LESSONS)
+    assert all((tmp_path / one).stat().st_size > 100 for one in pictures)
+
+
 def test_a_page_has_every_question_with_all_choices_and_replies(pair) -> None:
     """In the list for readers without scripts, and in what makes it live; before the lesson the list has no replies."""
     lesson, page, _ = pair
-    asked = [(asked_by(cell.source), html_of(shown)) for cell, shown in zip(lesson.cells, page.cells, strict=True)]
+    asked = [(asked_by(cell.source), html_of(shown)) for cell, shown in zip(code(lesson), code(page), strict=True)]
     asked = [(found, html) for found, html in asked if found]
     assert len(asked) == sum(cell.source.startswith(("ask(", "quiz(")) for cell in lesson.cells)
     for (questions, _, when), html in asked:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from html import escape
 from importlib.resources import files
@@ -91,7 +91,7 @@ class RecordedPane:
         counts: Positions of each axis by its name.
         size: Bytes as transferred (gzip) once all photographs are there; the stills of `html` come on top.
         still: What stands on the page before any script.
-        controls: Of the pane, for which `html` keeps room.
+        controls: Labels of the pane's controls, for which `html` keeps room.
         panels: That buttons open, for which it keeps room as well.
 
     >>> from pathlib import Path
@@ -107,7 +107,7 @@ class RecordedPane:
     counts: dict[str, int]
     size: int
     still: Picture | None = field(repr=False, compare=False)
-    controls: int = 0
+    controls: tuple[str, ...] = ()
     panels: int = 0
 
     def html(self, base: str = "") -> str:
@@ -218,8 +218,9 @@ class _Recorder:
         counts = {sheet.axes[0].name: len(sheet.values[0]) for sheet in sheets if len(sheet.axes) == 1}
         names = (pack, self._source, *images)
         still, traits = self._pane.still(), self._pane.traits
-        room = {"controls": len(traits.get("controls", ())), "panels": len(traits.get("panels", ()))}
-        return RecordedPane(self._pane.title, self._folder, pack, names, len(states), counts, size, still, **room)
+        labels = tuple(control["label"] for control in traits.get("controls", ()))
+        room = labels, len(traits.get("panels", ()))
+        return RecordedPane(self._pane.title, self._folder, pack, names, len(states), counts, size, still, *room)
 
     def _written(self, kept: RecordedPane) -> RecordedPane:
         """The recording, its files written."""
@@ -289,11 +290,17 @@ class _Recorder:
         return name, script_, list(pack.images)
 
 
-def _room(controls: int) -> str:
-    """As much room as the pane's controls and buttons will take (explorer.css), so that nothing jumps."""
-    columns = "grid-template-columns:repeat(auto-fill,minmax(min(290px,100%),1fr))"
-    rows = '<i style="height:26px"></i>' * controls + '<i style="height:26px;grid-column:1/-1"></i>'
-    return f'<div aria-hidden="true" style="display:grid;{columns};gap:4px 22px;padding:6px 2px 8px">{rows}</div>'
+def _room(controls: Sequence[str]) -> str:
+    """The controls, drawn where the live ones and their buttons will be (explorer.css), so that nothing jumps."""
+    wide = "minmax(min(320px,100%),792px)" if len(controls) == 1 else "repeat(auto-fill,minmax(min(290px,100%),1fr))"
+    font = "font:normal 13px system-ui,sans-serif"
+    row = "height:26px;display:flex;gap:8px;align-items:center"
+    track = '<s style="flex:1;height:5px;border-radius:3px;background:#8b94a3"></s>'
+    rows = "".join(f'<i style="{row};{font}">{escape(label)}{track}</i>' for label in controls)
+    return (
+        f'<div aria-hidden="true" style="display:grid;grid-template-columns:{wide};gap:4px 22px;padding:6px 2px 8px">'
+        f'{rows}<i style="height:26px;grid-column:1/-1"></i></div>'
+    )
 
 
 def _stills(picture: Picture, folder: Path, base: str) -> str:

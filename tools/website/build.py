@@ -20,7 +20,7 @@ import panes
 import slim_styles
 from api_pages import api_pages
 from course_pages import course_pages
-from lesson_page import LessonPage
+from lesson_page import PICTURES, LessonPage
 from links import on_site
 from scripts import question_script, style_sheet
 
@@ -80,7 +80,7 @@ def lay_out(recorder: panes.Recorder) -> None:
     notebooks = lesson_paths()
     pages = frozenset(path.relative_to(ROOT).as_posix() for path in [*documents, *notebooks])
     moving = {name: recorder.panes(name) for name in [*(path.name[:2] for path in notebooks), panes.HOME]}
-    made = {SOURCE / name: text for name, text in {**course_pages(), **api_pages()}.items()}
+    made = {SOURCE / name: text for name, text in {**course_pages(BUILT / PICTURES), **api_pages()}.items()}
     for path in documents:
         way = path.relative_to(ROOT).as_posix()
         made[SOURCE / way] = on_site(path.read_text(encoding="utf-8"), way, pages, ROOT)

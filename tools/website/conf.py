@@ -57,7 +57,7 @@ html_context = {
 }
 html_copy_source = False
 html_show_sourcelink = False
-html_sidebars = {"index": [], "learn": [], "search": []}
+html_sidebars = {"index": [], "learn": [], "lessons/*": [], "search": []}
 html_theme_options = {
     "logo": {"text": "camviz"},
     "navbar_end": ["theme-switcher", "repository"],

@@ -13,6 +13,7 @@ from html import escape
 from pathlib import Path
 
 import pictures
+from beside import Kind, beside
 from links import REPOSITORY, on_site
 
 from camviz.draw import prose
@@ -50,6 +51,7 @@ class LessonPage:
     def notebook(self) -> Notebook:
         """The notebook that MyST-NB makes the page from."""
         notebook = read(self.path)
+        moves = {cell.id for number, cell in enumerate(notebook.cells) if number in self.panes and _has_figure(cell)}
         for number, cell in enumerate(notebook.cells):
             if cell.cell_type == "markdown":
                 cell.source = self._text(cell)
@@ -58,6 +60,9 @@ class LessonPage:
                 if _is_folded(cell, number in self.panes):
                     cell.metadata["tags"] = [*cell.metadata.get("tags", []), "hide-input"]
         self._exercises(notebook)
+        notebook.cells = beside(notebook.cells, lambda cell: "pane" if cell.id in moves else _kind(cell))
+        for number, cell in enumerate(notebook.cells):
+            cell.id = f"cell-{number}"
         notebook.metadata["lesson"] = self.path.name[:2]
         return notebook
 
@@ -95,6 +100,20 @@ def _is_folded(cell: Cell, moves: bool) -> bool:
     """Whether the code of a cell is seen only when a reader asks for all code: it sets up, asks, checks or shows."""
     tags = set(cell.metadata.get("tags", []))
     return moves or bool({"setup", "colab", "check"} & tags) or asked_by(cell.source) is not None
+
+
+def _has_figure(cell: Cell) -> bool:
+    """Recordings of an earlier notebook have other numbers, and must not be taken for panes of this one."""
+    return any("<figure" in output.get("data", {}).get("text/html", "") for output in cell.get("outputs", []))
+
+
+def _kind(cell: Cell) -> Kind:
+    """What a cell without a pane is to the panes beside it. A fold and a listing take a column of their own."""
+    tags = set(cell.metadata.get("tags", []))
+    if cell.cell_type == "markdown":
+        return "other" if tags or "<details" in cell.source or "```" in cell.source else "said"
+    asked = asked_by(cell.source)
+    return "said" if "colab" in tags else "asked" if asked and asked[2] == "during" else "other"
 
 
 def asked_by(source: str) -> tuple[tuple[Question, ...], str, str] | None:

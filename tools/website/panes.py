@@ -40,7 +40,7 @@ HOME = "home"
 _HOME_CELL = """
 from camviz.views.frustum import FrustumView
 from camviz.widgets import explore
-explore(FrustumView(), "hfov_deg", "yaw_deg", "pitch_deg")
+explore(FrustumView(panels="world picture"), "yaw_deg", "pitch_deg", "hfov_deg")
 """
 RECORDERS = ("panes.py", "mistakes.py", "clips.py")
 PACKAGES = ("camviz", "camviz_clinic", "camviz_school")
