@@ -730,15 +730,14 @@ def test_two_cameras_of_one_number(says):
     assert mistaken == wrong.value / 100 * largest.value
     assert white.value == wrong.value
     assert right.value == again.value == read.value == pytest.approx(0.461 * half.value, abs=0.5)  # ISO 12232
-    (
-        numerators = [
+    numerators = [
         *says("This is the exposure itself. The speed is 10 over it"),
         *says("Here it is 10 over the exposure."),
         *says("You interpolate 10 over the exposures."),
     ]
     assert {one.value for one in numerators} == {recommended.value}
-    saturation = [*says("78 belongs to the saturation-based speed."), *says("This is the saturation-based speed, 78 over")]
-    assert all(100 * one.value / 78 == pytest.approx(100) for one in saturation)
+    of_saturation = [*says("78 belongs to the satu"), *says("This is the saturation-based speed, 78 over")]
+    assert [one.value for one in of_saturation] == [78, 78]
     named = [
         *says("At which exposure would the file have the number 118?"),
         *says("Here 118 decides."),
