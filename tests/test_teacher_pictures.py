@@ -22,7 +22,7 @@ BESIDE = re.compile(r"\b(?:Left|Right|Middle):|\b(?:left|right) (?:one|picture)\
 BELOW = re.compile(r"\bBelow:|\b(?:Lower|lower|Upper|upper) (?:row|right|left)\b")
 DRAWN_BY = {  # what a heading may speak of, and the panels that draw it, or words of a plot's description
     r"contours?": "displacements",
-    r"[Cc]urves?": "radial curve|curves?|section|towards the corner|right picture|Plot",
+    r"[Cc]urves?": "radial curve|curves?|section|corner|right picture|Plot",
     r"[Dd]isparities|maps?": "disparity map|second map|depth|map",
     r"tooth": "rays from above",
     r"[Bb]ars?": "bars|errors|estimates?|electrons|Plot",

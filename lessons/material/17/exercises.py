@@ -1,4 +1,4 @@
-"""Lesson 17, sharpness and exposure: from an edge to its MTF, lens and pixel together, the dark corners, the shutter.
+"""Lesson 17, sharpness and exposure: an edge and its MTF, the shutter; deeper, lens and pixel, field, corners, light.
 
 Frequencies are in cycles per pixel where an edge was measured, and in cycles per mm where optics makes them.
 """
@@ -323,7 +323,7 @@ def sum_of_the_sizes(light, step, frequency):
     return np.sum(np.abs(light * np.exp(-2j * np.pi * np.multiply.outer(frequency, x))), axis=-1) / np.sum(light)
 
 
-# 3: lens and pixel ---------------------------------------------------------------------------------------------------
+# 5: lens and pixel ---------------------------------------------------------------------------------------------------
 
 
 def system_mtf(per_mm: Array, f_number: float, wavelength_mm: float, pitch_mm: float) -> Array:
@@ -469,7 +469,7 @@ def divided_by_the_f_number(per_mm, f_number, wavelength_mm, pitch_mm):
     return _lens(per_mm, 1 / f_number, wavelength_mm) * _pixel(per_mm, pitch_mm)
 
 
-# 4: the corners ------------------------------------------------------------------------------------------------------
+# 7: the corners ------------------------------------------------------------------------------------------------------
 
 
 def falloff(r: Array, v: float) -> Array:
@@ -580,7 +580,7 @@ def half_the_height(r, v):
     return np.cos(np.arctan(r / (2 * v))) ** 4
 
 
-# 5: find the bug in the shutter --------------------------------------------------------------------------------------
+# 3: find the bug in the shutter --------------------------------------------------------------------------------------
 
 
 def shutter(t: Array, N: float, S: float, new_N: float, new_S: float) -> Array:
@@ -689,4 +689,375 @@ def the_factor(t, N, S, new_N, new_S):
     return np.ones_like(t) * (new_N / N) ** 2 * S / new_S
 
 
-EXERCISES = (LINE_SPREAD, MTF, SYSTEM, FALLOFF, SHUTTER)
+# 4: the standard's recipe --------------------------------------------------------------------------------------------
+
+
+def standard_mtf(profile: Array, step: float, frequency: Array) -> Array:
+    """ISO 12233:2014 on a profile (n,): differences of every second value, Hamming window, MTF (...), correction."""
+    light = (profile[2:] - profile[:-2]) * np.hamming(len(profile) - 2)
+    waves = np.exp(-2j * np.pi * np.multiply.outer(frequency, step * np.arange(len(light))))
+    return np.abs(waves @ light) / np.abs(np.sum(light)) / np.sinc(2 * frequency * step)
+
+
+def _profiles(rng: np.random.Generator) -> Iterator[Arguments]:
+    for shape, falling in zip(SHAPES, (False, True, False, True), strict=True):
+        x = np.arange(-2.5, 2.5, 0.25) + rng.uniform(-0.1, 0.1)
+        rise = 1 / (1 + np.exp(-rng.uniform(1.5, 2.5) * x)) + 0.1 * x * np.exp(-(x**2))
+        yield rng.uniform(0.5, 1.5) + (-2 if falling else 2) * rise, 0.25, rng.uniform(0.15, 0.9, shape)
+    x = np.arange(-2.0, 2.0, 0.2)
+    yield np.tanh(rng.uniform(1, 2) * x) + 0.2 * np.sin(3 * x), 0.2, np.array([0.0, 0.2, 0.5, 0.8, 1.2])
+
+
+STANDARD = Exercise(
+    name="17.standard_mtf",
+    reference=standard_mtf,
+    cases=_profiles,
+    hints=(
+        "Four steps follow one another. Which of them shortens the profile, and by how many values?",
+        "`profile[2:] - profile[:-2]` are the differences of every second value. `np.hamming(m)` has m values, 1 in "
+        "the middle. Then do what you did in exercise 2, and divide by sinc(2 f · step).",
+        "`light = (profile[2:] - profile[:-2]) * np.hamming(___)`",
+    ),
+    praise="That is the recipe of 2014, from the profile on.",
+)
+
+
+@STANDARD.right
+def with_sums_of_cosines_and_sines(profile, step, frequency):
+    light = np.array([b - a for a, b in zip(profile, profile[2:], strict=False)])
+    m = len(light)
+    light = light * (0.54 - 0.46 * np.cos(2 * np.pi * np.arange(m) / (m - 1)))
+    angle = 2 * np.pi * np.asarray(frequency)[..., None] * step * np.arange(m)
+    size = np.hypot((light * np.cos(angle)).sum(axis=-1), (light * np.sin(angle)).sum(axis=-1))
+    return size / abs(light.sum()) / np.sinc(2 * step * np.asarray(frequency))
+
+
+@STANDARD.right
+def by_convolution_and_from_the_middle(profile, step, frequency):
+    light = np.convolve(profile, [0.5, 0, -0.5], "valid") / step * np.hamming(len(profile) - 2)
+    x = step * (np.arange(len(light)) - (len(light) - 1) / 2)
+    sums = np.tensordot(np.exp(2j * np.pi * np.multiply.outer(np.asarray(frequency), x)), light, 1)
+    return (np.abs(sums / light.sum()) / np.sinc(2 * np.asarray(frequency) * step)).tolist()
+
+
+def _standard(profile, step, frequency, *, window=np.hamming, width=2.0):
+    light = (profile[2:] - profile[:-2]) * window(len(profile) - 2)
+    left = np.sinc(width * np.asarray(frequency) * step)
+    return np.abs(_transform(light, step, frequency)) / np.abs(np.sum(light)) / left
+
+
+@STANDARD.wrong("The window is missing: multiply the differences by `np.hamming` before you add the waves up.")
+def without_the_window(profile, step, frequency):
+    return _standard(profile, step, frequency, window=np.ones)
+
+
+@STANDARD.wrong("Your window is Hann's, which falls to 0 at its ends. The standard of 2014 has Hamming's.")
+def with_hann_s_window(profile, step, frequency):
+    return _standard(profile, step, frequency, window=np.hanning)
+
+
+@STANDARD.wrong(
+    "The correction is missing: differences of every second value dim a grating. Divide by sinc(2 f · step)."
+)
+def without_the_correction(profile, step, frequency):
+    return _standard(profile, step, frequency, width=0.0)
+
+
+@STANDARD.wrong("You correct for a difference of neighbours. Every second value is 2 steps away: sinc(2 f · step).")
+def corrected_for_neighbours(profile, step, frequency):
+    return _standard(profile, step, frequency, width=1.0)
+
+
+@STANDARD.wrong("`np.sinc(x)` is sin(πx)/(πx) already: the π is in your correction twice.")
+def corrected_with_pi(profile, step, frequency):
+    return _standard(profile, step, frequency, width=2 * np.pi)
+
+
+@STANDARD.wrong("You multiply by sinc(2 f · step). That is what the differences took: divide by it.")
+def corrected_the_wrong_way(profile, step, frequency):
+    return _standard(profile, step, frequency) * np.sinc(2 * np.asarray(frequency) * step) ** 2
+
+
+@STANDARD.wrong(
+    "Your differences are those of neighbours. The recipe takes every second value: profile[2:] − profile[:-2]."
+)
+def differences_of_neighbours(profile, step, frequency):
+    light = np.diff(profile) * np.hamming(len(profile) - 1)
+    return np.abs(_transform(light, step, frequency)) / np.abs(light.sum()) / np.sinc(2 * np.asarray(frequency) * step)
+
+
+@STANDARD.wrong("The window belongs on the differences. On the profile it makes two more edges, at its ends.")
+def window_on_the_profile(profile, step, frequency):
+    faded = profile * np.hamming(len(profile))
+    light = faded[2:] - faded[:-2]
+    left = np.sinc(2 * np.asarray(frequency) * step)
+    return np.abs(_transform(light, step, frequency)) / np.abs(light.sum()) / left
+
+
+@STANDARD.wrong("You divide by the sum *before* the window. At frequency 0 the MTF is 1: divide by the sum after it.")
+def divided_by_the_sum_before_the_window(profile, step, frequency):
+    light = profile[2:] - profile[:-2]
+    return _standard(profile, step, frequency) * np.abs(np.sum(light * np.hamming(len(light))) / np.sum(light))
+
+
+# 6: towards the edge of the picture ----------------------------------------------------------------------------------
+
+
+def field_blur(h: Array, focal_mm: float, f_number: float, n: float) -> tuple[Array, Array]:
+    """The light's widths (...) in mm across sagittal and tangential lines: h²/(2fN) times 1 + 1/n and 3 + 1/n."""
+    flat = h**2 / (2 * focal_mm * f_number)
+    return flat * (1 + 1 / n), flat * (3 + 1 / n)
+
+
+def _fields(rng: np.random.Generator) -> Iterator[Arguments]:
+    for shape in SHAPES:
+        yield rng.uniform(3, 15, shape), rng.uniform(35, 90), rng.uniform(4, 16), rng.uniform(1.45, 1.85)
+    yield np.array([0.0, -6.0, 6.0]), 50.0, 8.0, 1.5  # the middle, and either side of it
+
+
+FIELD = Exercise(
+    name="17.field_blur",
+    reference=field_blur,
+    cases=_fields,
+    hints=(
+        "Two lengths along the axis first, from the two formulas. How wide is a cone of light that ends that far away?",
+        "Out of focus by x, the disc of the rays is x / N wide. So both widths are h² / (2 f N), each times a bracket.",
+        "`return flat * (1 + 1 / n), flat * ___`",
+    ),
+    praise="Tangential lines lose more, and both blurs grow with the square of the height.",
+)
+
+
+@FIELD.right
+def by_lengths_along_the_axis(h, focal_mm, f_number, n):
+    petzval = np.square(h) / (2 * focal_mm * n)
+    sagittal = petzval + np.square(h) / (2 * focal_mm)
+    return sagittal / f_number, (petzval + 3 * (sagittal - petzval)) / f_number
+
+
+@FIELD.right
+def as_a_list(h, focal_mm, f_number, n):
+    return [share * np.asarray(h) ** 2 / 2 / (focal_mm * f_number) for share in (1 + 1 / n, 3 + 1 / n)]
+
+
+def _blurs(h, focal_mm, f_number, n, s=1.0, t=3.0):
+    flat = np.asarray(h) ** 2 / (2 * focal_mm * f_number)
+    return flat * (s + 1 / n), flat * (t + 1 / n)
+
+
+@FIELD.wrong("The two have changed places. The sagittal one comes first, and it is the smaller.")
+def changed_places(h, focal_mm, f_number, n):
+    return _blurs(h, focal_mm, f_number, n, 3.0, 1.0)
+
+
+@FIELD.wrong("These are the distances along the axis. The light is x / N wide there: divide by the f-number.")
+def distances_along_the_axis(h, focal_mm, f_number, n):
+    return _blurs(h, focal_mm, 1.0, n)
+
+
+@FIELD.wrong("You multiply by the f-number. A larger N is a narrower cone: divide.")
+def times_the_f_number(h, focal_mm, f_number, n):
+    return _blurs(h, focal_mm, 1 / f_number, n)
+
+
+@FIELD.wrong("Your blur grows in proportion to h. It grows with its *square*.")
+def in_proportion_to_h(h, focal_mm, f_number, n):
+    flat = np.abs(h) / (2 * focal_mm * f_number)
+    return flat * (1 + 1 / n), flat * (3 + 1 / n)
+
+
+@FIELD.wrong("The 2 below h² is missing: yours is twice as wide.")
+def twice_as_wide(h, focal_mm, f_number, n):
+    return _blurs(h, focal_mm / 2, f_number, n)
+
+
+@FIELD.wrong("You add n where 1/n belongs.")
+def n_for_its_inverse(h, focal_mm, f_number, n):
+    return _blurs(h, focal_mm, f_number, 1 / n)
+
+
+@FIELD.wrong("The 1/n is missing. Without it the field of the lens would be flat but for astigmatism.")
+def without_the_curved_field(h, focal_mm, f_number, n):
+    flat = np.asarray(h) ** 2 / (2 * focal_mm * f_number)
+    return flat, 3 * flat
+
+
+@FIELD.wrong("Your second width has the 3 before the whole bracket: the bracket is 3 + 1/n.")
+def three_before_the_bracket(h, focal_mm, f_number, n):
+    sagittal, _ = _blurs(h, focal_mm, f_number, n)
+    return sagittal, 3 * sagittal
+
+
+# 8: veiling glare ----------------------------------------------------------------------------------------------------
+
+
+def unveil(recorded: Array, glare: float) -> Array:
+    """The light (height, width, 3) without the share of it that was spread evenly over the picture."""
+    mean = np.mean(recorded, axis=(0, 1))
+    return (recorded - glare * mean) / (1 - glare)
+
+
+def _veiled(rng: np.random.Generator) -> Iterator[Arguments]:
+    for height, width in ((4, 6), (3, 3), (1, 5)):
+        yield rng.uniform(0.1, 1, (height, width, 3)) * rng.uniform(0.3, 1, 3), float(rng.uniform(0.05, 0.3))
+    yield rng.uniform(0, 1, (2, 5, 3)), 0.0  # a perfect lens
+    yield rng.uniform(0, 0.3, (3, 4, 3)) ** 2, 0.25  # noise has made some pixels darker than the veil
+
+
+VEIL = Exercise(
+    name="17.unveil",
+    reference=unveil,
+    cases=_veiled,
+    hints=(
+        "Solve the equation for the light. Which mean stands in it, and is it known from what was recorded?",
+        "Spreading light over the picture changes no colour's mean: that of `recorded` is that of the light. "
+        "`axis=(0, 1)` keeps the three colours apart.",
+        "`return (recorded - ___) / (1 - glare)`",
+    ),
+    praise="The veil is gone. The noise that it brought stays.",
+)
+
+
+@VEIL.right
+def colour_by_colour(recorded, glare):
+    out = np.empty_like(recorded)
+    for channel in range(3):
+        one = recorded[..., channel]
+        out[..., channel] = (one - glare * one.mean()) / (1 - glare)
+    return out
+
+
+@VEIL.right
+def by_what_deviates_from_the_mean(recorded, glare):
+    mean = recorded.mean(axis=0, keepdims=True).mean(axis=1, keepdims=True)
+    return (mean + (recorded - mean) / (1 - glare)).tolist()
+
+
+@VEIL.wrong("You take one mean of all three colours. A veil has the colour of the picture: `mean(axis=(0, 1))`.")
+def one_mean_of_all(recorded, glare):
+    return (recorded - glare * np.mean(recorded)) / (1 - glare)
+
+
+@VEIL.wrong("The veil is taken off, but the picture is too dark: it has kept only the share 1 − glare. Divide by that.")
+def too_dark(recorded, glare):
+    return recorded - glare * np.mean(recorded, axis=(0, 1))
+
+
+@VEIL.wrong("You take `glare` itself off. The veil is that share of the *mean*: glare · mean.")
+def glare_itself(recorded, glare):
+    return (recorded - glare) / (1 - glare)
+
+
+@VEIL.wrong("You put the veil on once more. Solve the equation for the light.")
+def veiled_again(recorded, glare):
+    return (1 - glare) * recorded + glare * np.mean(recorded, axis=(0, 1))
+
+
+@VEIL.wrong("You multiply by 1 − glare. The light was multiplied by it: divide.")
+def multiplied_by_what_is_left(recorded, glare):
+    return (recorded - glare * np.mean(recorded, axis=(0, 1))) * (1 - glare)
+
+
+@VEIL.wrong("You divide by 1 + glare. Of the light, 1 − glare has gone the straight way.")
+def divided_by_one_plus(recorded, glare):
+    return (recorded - glare * np.mean(recorded, axis=(0, 1))) / (1 + glare)
+
+
+@VEIL.wrong(
+    "You take the darkest value off. That makes black black, and it is the veil only where the scene has a black."
+)
+def darkest_value_off(recorded, glare):
+    return (recorded - np.min(recorded, axis=(0, 1))) / (1 - glare)
+
+
+@VEIL.wrong(
+    "You cut off at 0. Noise makes some pixels negative; cut them off, and the mean of the dark ones is too high."
+)
+def cut_off_at_zero(recorded, glare):
+    return np.maximum(unveil(recorded, glare), 0)
+
+
+# 9: what an ISO number promises --------------------------------------------------------------------------------------
+
+
+def output_speed(lux_s: Array, numbers: Array) -> float:
+    """ISO 12232's standard output sensitivity: 10 over the exposure, in lux s, whose number in the file is 118."""
+    return 10 / np.interp(118, numbers, lux_s)
+
+
+def _responses(rng: np.random.Generator) -> Iterator[Arguments]:
+    for count in (6, 9, 12, 7):
+        lux_s = np.cumsum(rng.uniform(0.5, 1.5, count)) * 10.0 ** rng.uniform(-4, -1)
+        share = np.linspace(0.03, 1, count) ** rng.uniform(0.4, 0.9)
+        yield lux_s, 255 * share + rng.uniform(-0.2, 0.2, count)
+    yield np.array([0.01, 0.02, 0.05, 0.08, 0.1]), np.array([40.0, 118.0, 200.0, 255.0, 255.0])
+
+
+SPEED = Exercise(
+    name="17.output_speed",
+    reference=output_speed,
+    cases=_responses,
+    hints=(
+        "At which exposure would the file have the number 118? It lies between two of those that were tried.",
+        "`np.interp(x, xs, ys)` reads ys off at x. Here the numbers play the part of xs, and the exposures that of ys.",
+        "`return 10 / np.interp(118, ___, lux_s)`",
+    ),
+    praise="That is the number on many a camera's ISO dial, as far as its maker measured it in this way.",
+)
+
+
+@SPEED.right
+def by_the_two_neighbours(lux_s, numbers):
+    k = int(np.argmax(np.asarray(numbers) >= 118))
+    share = (118 - numbers[k - 1]) / (numbers[k] - numbers[k - 1])
+    return 10 / (lux_s[k - 1] + share * (lux_s[k] - lux_s[k - 1]))
+
+
+@SPEED.right
+def by_scipy(lux_s, numbers):
+    from scipy.interpolate import interp1d
+
+    return float(10 / interp1d(numbers[: int(np.argmax(numbers)) + 1], lux_s[: int(np.argmax(numbers)) + 1])(118))
+
+
+@SPEED.wrong("This is the exposure itself. The speed is 10 *over* it: a fast camera needs little light.")
+def the_exposure(lux_s, numbers):
+    return np.interp(118, numbers, lux_s)
+
+
+@SPEED.wrong("78 belongs to the saturation-based speed. Here it is 10 over the exposure.")
+def with_78(lux_s, numbers):
+    return 78 / np.interp(118, numbers, lux_s)
+
+
+@SPEED.wrong("This is the saturation-based speed, 78 over the exposure at the largest number. Here 118 decides.")
+def saturation_based(lux_s, numbers):
+    return 78 / lux_s[int(np.argmax(numbers))]
+
+
+@SPEED.wrong("You take the nearest exposure that was tried. Read between the two neighbours: `np.interp`.")
+def the_nearest(lux_s, numbers):
+    return 10 / lux_s[int(np.argmin(np.abs(numbers - 118)))]
+
+
+@SPEED.wrong("You look for 18 % of 255, which is 46. The file's numbers are encoded: 18 % of white is 118 in sRGB.")
+def eighteen_percent_of_the_numbers(lux_s, numbers):
+    return 10 / np.interp(0.18 * 255, numbers, lux_s)
+
+
+@SPEED.wrong("You look for half of 255. The number of the standard is 118.")
+def half_of_the_numbers(lux_s, numbers):
+    return 10 / np.interp(127.5, numbers, lux_s)
+
+
+@SPEED.wrong("The two lists have changed places: the numbers are known to be 118, and the exposure is wanted.")
+def lists_changed_places(lux_s, numbers):
+    return 10 / np.interp(118, lux_s, numbers)
+
+
+@SPEED.wrong("You interpolate 10 over the exposures. Find the exposure first, and divide then.")
+def interpolated_speeds(lux_s, numbers):
+    return np.interp(118, numbers, 10 / lux_s)
+
+
+EXERCISES = (LINE_SPREAD, MTF, SHUTTER, STANDARD, SYSTEM, FIELD, FALLOFF, VEIL, SPEED)

@@ -5,7 +5,7 @@ A reader's own function can draw its fall-off towards the corners beside the rig
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar
@@ -14,7 +14,7 @@ import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import plot, svg
-from camviz.draw.flow import rows
+from camviz.draw.flow import Cell, rows
 from camviz.draw.panel import image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, seconds, signed
@@ -34,9 +34,9 @@ FOCAL_MM, SENSOR_MM = 35.0, (36.0, 24.0)
 RIM_MM, RIM_DISTANCE_MM = 32.0, 20.0  # of the barrel, in front of the aperture
 SUBJECTS = {"garden": (0.0, 1.0), "snow": (0.72, 0.22), "coal": (0.015, 0.05)}  # reflectance: offset, and of the garden
 _WIDTH, _HEIGHT = 600, 400
-_LAYOUT = rows(
-    (324, {"picture": 440, "towards the corner": 300, "numbers": 220}), (226, {"histogram": 520, "stops": 440})
-)
+_ROWS = (324, {"picture": 440, "corner": 300, "signal": 220, "numbers": 220}), (226, {"histogram": 520, "stops": 440})
+"""The panels in their rows, and how high a row and how wide each panel is in picture units."""
+_SIGNAL = ("shutter", "ISO", "18 % grey", "its signal / noise")
 _STOPS = (-9.0, 1.0)  # of the histogram, below and above white
 
 
@@ -48,10 +48,12 @@ class ExposureView(View):
     light as the EV that a hand-held meter reads at ISO 100: 15 in full sun. With `metering` "average", the camera
     chooses the shutter so that the picture's mean becomes 18 % of white, and `compensation` stops more. `vignetting`
     darkens the corners; `yours` is a reader's function of (r_mm, v_mm), heights (n,) on the sensor and its distance
-    from the lens, to the light (n,) there, 1 on the axis.
+    from the lens, to the light (n,) there, 1 on the axis. `panels` names what is drawn: the picture, and any of corner,
+    signal (those numbers that say it, without the others), numbers, histogram and stops.
     """
 
     title: ClassVar[str] = "Exposure"
+    openable: ClassVar[Mapping[str, str]] = {"corner": "corner", "histogram": "histogram", "stops": "stops"}
 
     f_number: float = slider(8.0, 1.4, 22.0, 0.1, label="f-number N", help="focal length / diameter of the aperture")
     shutter: float = slider(-9.0, -13.0, 0.0, 1 / 3, unit="stops", help="exposure time: 0 is 1 s, −1 half of it")
@@ -61,11 +63,15 @@ class ExposureView(View):
     compensation: float = slider(0.0, -3.0, 3.0, 1 / 3, unit="stops", help="brighter or darker than the meter says")
     subject: str = choice("garden", *list(SUBJECTS)[1:], help="the same scene, covered with snow or made of coal")
     vignetting: str = choice("none", "cos⁴", "cos⁴ and rim", help="what darkens the corners")
+    panels: str = "picture corner numbers histogram stops"
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         positive(self, "f_number")
+        known = [name for _, line in _ROWS for name in line]
+        if "picture" not in (wanted := self.panels.split()) or not {*wanted} <= {*known}:
+            raise ValueError(f"panels must be picture and any of {', '.join(known[1:])}, got {self.panels!r}")
 
     # What is true -----------------------------------------------------------------------------------------------------
 
@@ -134,10 +140,6 @@ class ExposureView(View):
 
     def numbers(self) -> dict[str, str]:
         """The state's key figures, as text."""
-        return self._numbers
-
-    @cached_property
-    def _numbers(self) -> dict[str, str]:
         recorded = self.recorded(draft=True)
         grey = GREY * self.electrons_of_white
         corner = float(np.log2(self.falloff(np.array(_CORNER_MM))))
@@ -162,24 +164,32 @@ class ExposureView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         recorded = self.recorded(draft=draft)
-        parts = {
-            "picture": self._picture_panel(),
-            "towards the corner": self._corner_panel(),
-            "numbers": self._numbers_column(),
-            "histogram": self._histogram_panel(recorded),
-            "stops": self._stops_panel(),
+        figures = self.numbers()
+        draw: dict[str, Callable[[float], str]] = {
+            "picture": self._picture_panel,
+            "corner": self._corner_panel,
+            "signal": lambda x: readout({name: figures[name] for name in _SIGNAL}, (x + 10, 48), (0, 42), (0, 18)),
+            "numbers": lambda x: readout(figures, (x + 10, 36), (0, 31), (0, 15)),
+            "histogram": lambda x: self._histogram_panel(x, recorded),
+            "stops": self._stops_panel,
         }
-        return self.tiled(_LAYOUT, parts, {"camera": jpeg(to_display(recorded))})
+        layout = self._layout
+        parts = {name: draw[name](x) for name, (x, *_) in layout.items()}
+        return self.tiled(layout, parts, {"camera": jpeg(to_display(recorded))})
 
-    def _picture_panel(self) -> str:
-        panel = image_panel("picture", 10, 34, 420, _WIDTH, _HEIGHT)
+    @property
+    def _layout(self) -> dict[str, Cell]:
+        return rows(*((high, {name: w for name, w in line.items() if self._has(name)}) for high, line in _ROWS))
+
+    def _picture_panel(self, left: float) -> str:
+        panel = image_panel("picture", left + 10, 34, 420, _WIDTH, _HEIGHT)
         shown = placed_image(panel, "camera", _WIDTH, _HEIGHT, style="image-rendering:pixelated")
         note = f"f/{self.f_number:.3g}, {seconds(2.0**self.shutter_stops)}, ISO {100 * 2**self.iso:.0f}"
         return panel.show(shown, title="The picture", note=note)
 
-    def _histogram_panel(self, recorded: np.ndarray) -> str:
+    def _histogram_panel(self, left: float, recorded: np.ndarray) -> str:
         """How many pixels are how many stops below white."""
-        panel = plot.plot_panel("histogram", 66, 358, 444, 144, _STOPS, (0, 1.1))
+        panel = plot.plot_panel("histogram", left + 66, 358, 444, 144, _STOPS, (0, 1.1))
         with np.errstate(divide="ignore", invalid="ignore"):
             stops = np.log2(np.maximum(recorded.mean(axis=-1), 2.0**-9)).ravel()
         counts, borders = np.histogram(stops, np.linspace(-9.1, 1, 80))
@@ -191,7 +201,7 @@ class ExposureView(View):
         shown = panel.show(content + marks + words, title="Histogram")
         return shown + plot.axes(panel, "stops from white", "√ pixels", None, [(1.0, "most")])
 
-    def _stops_panel(self) -> str:
+    def _stops_panel(self, left: float) -> str:
         """Light, aperture, shutter and gain as bars of stops that add up; all are 0 by the rule of the sunny 16."""
         aperture = 8 - float(exposure_value(self.f_number, 1.0))
         parts = {
@@ -201,7 +211,7 @@ class ExposureView(View):
             "ISO gain": (self.iso, "fill-purple"),
         }
         whole = sum(value for value, _ in parts.values())
-        panel = plot.plot_panel("stops", 632, 358, 318, 144, (-14, 20), (0, 5))
+        panel = plot.plot_panel("stops", left + 112, 358, 318, 144, (-14, 20), (0, 5))
         rows = [*((name, *one) for name, one in parts.items()), ("together", whole, "fill-muted")]
         drawn = [
             svg.polygon(panel.place([(0, 4.2 - i), (value, 4.2 - i), (value, 4.8 - i), (0, 4.8 - i)]), class_)
@@ -218,9 +228,9 @@ class ExposureView(View):
         shown = panel.show(plot.grid(panel, ticks, []) + "".join(drawn), title="Stops that add up")
         return shown + plot.axes(panel, "stops from the sunny 16 rule", "", ticks, names) + "".join(values)
 
-    def _corner_panel(self) -> str:
+    def _corner_panel(self, left: float) -> str:
         """The light towards the corner, by each cause and by the reader's function, or what is to be said of that."""
-        panel = plot.plot_panel("corners", 502, 34, 226, 240, (0, _CORNER_MM), (0, 1.08))
+        panel = plot.plot_panel("corners", left + 62, 34, 226, 240, (0, _CORNER_MM), (0, 1.08))
         r = np.linspace(0, _CORNER_MM, 60)
         curves = plot.curve(panel, r, self.falloff(r, cos4=True, rim=False), "blue dashed")
         curves += plot.curve(panel, r, self.falloff(r, cos4=False, rim=True), "purple dashed")
@@ -236,9 +246,6 @@ class ExposureView(View):
         content = curves + points + plot.legend(panel, entries, "bottom left")
         names = "height on the sensor (mm)", "light, 1 on the axis"
         return plot.plotted(panel, content, *names, title="Light towards the corner")
-
-    def _numbers_column(self) -> str:
-        return svg.text((750, 26), "This exposure", "title") + readout(self.numbers(), (750, 48), (0, 31), (0, 15))
 
 
 _CORNER_MM = float(np.hypot(*SENSOR_MM)) / 2

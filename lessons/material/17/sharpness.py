@@ -5,7 +5,7 @@ A reader's own function can draw its curve beside the right one.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar
@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from camviz.draw import plot, svg
-from camviz.draw.flow import rows
+from camviz.draw.flow import Cell, rows, shortened
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, png
 from camviz.draw.readout import listed, readout
@@ -27,7 +27,7 @@ from camviz.optics import (
     pixel_transfer,
 )
 from camviz.scenes import to_display
-from camviz.views.base import View, positive, slider, switch
+from camviz.views.base import View, positive, slider
 from camviz.views.yours import tried
 
 FIELD_UM = (320, 240)  # of the sensor that the picture shows
@@ -39,7 +39,8 @@ _STAR = (228.0, 120.0, 78.0)  # centre and radius, µm
 _SPOKES = 36
 _MARGIN_UM = 40  # painted around the field, because a Fourier transform joins opposite ends
 _EDGE_UM = 75.0
-_LAYOUT = rows((406, {"picture": 440, "curves": 340, "numbers": 180}))
+_WIDE = {"picture": 440, "curves": 340, "numbers": 180}
+"""The panels in their order, and how wide each is in picture units."""
 _COLOURS = ("red", "green", "blue")
 
 
@@ -50,12 +51,13 @@ class SharpnessView(View):
     The sensor stands `defocus_um` behind the place where the image is sharp, so that rays make a disc of defocus / N.
     With `axial_um` red light is sharp so much farther away than green, and blue as much nearer; with `lateral_um` their
     images lie as far aside. Then the light is white, else it is of one `wavelength_nm`. The contrast of diffraction and
-    defocus together is exact for round openings, not their product. `parts` shows the curves of each cause alone;
-    `yours` is a reader's function of (per_mm, f_number, wavelength_mm, pitch_mm), frequencies (n,) to the MTF (n,) of
-    lens and pixel in focus.
+    defocus together is exact for round openings, not their product. `panels` names
+    what is drawn: the picture, and any of curves and numbers. `yours` is a reader's function of (per_mm, f_number,
+    wavelength_mm, pitch_mm), frequencies (n,) to the MTF (n,) of lens and pixel in focus.
     """
 
     title: ClassVar[str] = "Sharpness"
+    openable: ClassVar[Mapping[str, str]] = {"curves": "curve", "numbers": "numbers"}
 
     f_number: float = slider(5.6, 1.4, 32.0, 0.1, label="f-number N", help="focal length / diameter of the aperture")
     defocus_um: float = slider(0.0, 0.0, 100.0, 1.0, label="defocus", unit="µm", help="from sharp image to sensor")
@@ -63,12 +65,14 @@ class SharpnessView(View):
     wavelength_nm: float = slider(550.0, 400.0, 700.0, 5.0, label="wavelength λ", unit="nm", help="of the light")
     axial_um: float = slider(0.0, 0.0, 60.0, 1.0, label="axial colour", unit="µm", help="red and blue focus apart")
     lateral_um: float = slider(0.0, 0.0, 12.0, 0.5, label="lateral colour", unit="µm", help="red and blue lie aside")
-    parts: bool = switch(True, label="each cause alone", help="diffraction, defocus and pixel by themselves")
+    panels: str = " ".join(_WIDE)
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         positive(self, "f_number", "pitch_um", "wavelength_nm")
+        if "picture" not in (wanted := self.panels.split()) or not {*wanted} <= {*_WIDE}:
+            raise ValueError(f"panels must be picture and any of {', '.join([*_WIDE][1:])}, got {self.panels!r}")
         if self.pitch_um < 0.5:
             raise ValueError(f"pitch_um must be at least 0.5, got {self.pitch_um}")
 
@@ -157,30 +161,32 @@ class SharpnessView(View):
     # What it looks like -----------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        curves, problem = self._curves_panel()
-        parts = {
-            "picture": self._picture_panel() + svg.paragraph((10, 368), problem, 420),
-            "curves": curves + self._legend(),
-            "numbers": self._numbers_column(),
-        }
-        return self.tiled(_LAYOUT, parts, {"sensor": png(to_display(self.image(draft=draft)))})
+        draw = {"picture": self._picture_panel, "curves": self._curves_panel, "numbers": self._numbers_column}
+        parts = {name: draw[name](x) for name, (x, *_) in self._layout.items()}
+        return self.tiled(self._layout, parts, {"sensor": png(to_display(self.image(draft=draft)))})
 
-    def _picture_panel(self) -> str:
-        panel = image_panel("sensor", 10, 34, 420, *FIELD_UM)
+    @cached_property
+    def _layout(self) -> dict[str, Cell]:
+        high = {"picture": 358, "curves": 406 + 54 * bool(self.yours), "numbers": 356}
+        return shortened(rows((max(high.values()), {name: w for name, w in _WIDE.items() if self._has(name)})), **high)
+
+    def _picture_panel(self, left: float) -> str:
+        panel = image_panel("sensor", left + 10, 34, 420, *FIELD_UM)
         shown = placed_image(panel, "sensor", *FIELD_UM, style="image-rendering:pixelated")
         note = f"{FIELD_UM[0] / 1000:g} × {FIELD_UM[1] / 1000:g} mm of the sensor"
         return panel.show(shown, title="What the pixels record", note=note)
 
-    def _curves_panel(self) -> tuple[str, str]:
-        """The curves, and what is to be said of the reader's function."""
-        panel = plot.plot_panel("curves", 500, 34, 270, 252, (0, TOP_PER_MM), (0, 1.08))
+    def _curves_panel(self, left: float) -> str:
+        """The curves, and below them what is to be said of the reader's function."""
+        panel = plot.plot_panel("curves", left + 60, 34, 270, 252, (0, TOP_PER_MM), (0, 1.08))
         f = np.linspace(0, TOP_PER_MM, 131)
         curves = self._colours(panel, f) if self.coloured else self._causes(panel, f)
         yours, problem = self._your_points(panel)
         nyquist = plot.upright(panel, self.nyquist_per_mm, "muted dotted")
         content = nyquist + curves + self._half(panel) + yours
         names = "frequency (cycles per mm)", "MTF"
-        return plot.plotted(panel, content, *names, title="Contrast that is left"), problem
+        drawn = plot.plotted(panel, content, *names, title="Contrast that is left") + self._legend(left)
+        return drawn + svg.paragraph((left + 40, 416), problem, 290)
 
     def _causes(self, panel: Panel, f: np.ndarray) -> str:
         """What each cause alone leaves, and all of them."""
@@ -189,7 +195,7 @@ class SharpnessView(View):
             "purple dashed": np.abs(disc_transfer(f, self.disc_mm())),
             "green dashed": np.abs(pixel_transfer(f, self.pitch_um / 1000)),
         }
-        drawn = [plot.curve(panel, f, values, class_) for class_, values in alone.items()] if self.parts else []
+        drawn = [plot.curve(panel, f, values, class_) for class_, values in alone.items()]
         return "".join([*drawn, plot.curve(panel, f, self.system(f), "ink thick")])
 
     def _colours(self, panel: Panel, f: np.ndarray) -> str:
@@ -209,22 +215,22 @@ class SharpnessView(View):
         points = panel.place(np.stack([f, np.clip(values, -1, 2)], axis=-1))
         return svg.line(points, "orange") + svg.dots(points, "orange", 6), problem
 
-    def _legend(self) -> str:
+    def _legend(self, left: float) -> str:
         """Below the curves, where it stands in no curve's way."""
-        entries = [("ink thick", "all together")]
+        entries = [("ink thick", "all together"), ("blue dashed", "diffraction")]
+        entries += [("purple dashed", "defocus"), ("green dashed", "pixel")]
         if self.coloured:
-            entries = [("red thick", "red"), ("green thick", "green"), ("blue thick", "blue")]
-        elif self.parts:
-            entries += [("blue dashed", "diffraction"), ("purple dashed", "defocus"), ("green dashed", "pixel")]
+            entries = [(f"{name} thick", name) for name in _COLOURS]
         entries += [("muted dotted", "Nyquist"), *([("orange thick", "yours")] if self.yours else [])]
         drawn = ""
         for i, (class_, words) in enumerate(entries):
-            x, y = 480 + 150 * (i % 2), 346 + 20 * (i // 2)
+            x, y = left + 40 + 150 * (i % 2), 346 + 20 * (i // 2)
             drawn += svg.line([(x, y), (x + 20, y)], class_) + svg.text((x + 26, y + 4), words, "note")
         return drawn
 
-    def _numbers_column(self) -> str:
-        return svg.text((790, 26), "This camera", "title") + readout(self.numbers(), (790, 54), (0, 40), (0, 17))
+    def _numbers_column(self, left: float) -> str:
+        column = readout(self.numbers(), (left + 10, 54), (0, 40), (0, 17))
+        return svg.text((left + 10, 26), "This camera", "title") + column
 
 
 @lru_cache(maxsize=2)
