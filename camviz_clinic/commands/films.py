@@ -63,11 +63,13 @@ def as_pictures(options: argparse.Namespace, how: Mapping[str, Any]) -> Iterator
             refuse_output(output, "file", *films)
     _refuse_half(given, options)
     with TemporaryDirectory(prefix="camviz-") as room:
-        notes = _frames_of(given, Path(room), options, how) if films else ()
+        notes = list(_frames_of(given, Path(room), options, how)) if films else []
         for word, several in given.items():
             if several:
-                setattr(options, word, [str(path) for path in _stills(several, Path(room) / word)])
-        yield notes
+                stills, skipped = _stills(several, Path(room) / word)
+                notes += skipped
+                setattr(options, word, [str(path) for path in stills])
+        yield tuple(notes)
 
 
 def _found(words: Sequence[str]) -> list[Path]:
@@ -141,12 +143,16 @@ def _by_name(films: Sequence[Path]) -> dict[str, Path]:
     return {called[path.with_suffix("")]: path for path in films}
 
 
-def _stills(paths: Sequence[Path], room: Path) -> list[Path]:
-    """The pictures, of HEIC stills the PNG."""
+def _stills(paths: Sequence[Path], room: Path) -> tuple[list[Path], list[str]]:
+    """The pictures, of HEIC stills the PNG; and what is to be said of those that cannot be read.
+
+    Raises Refusal where none can be.
+    """
     from camviz.colour.picture_files import PictureError
     from camviz_clinic.films.stills import HeicMissing, as_png
 
-    found = []
+    found: list[Path] = []
+    notes: list[str] = []
     for path in paths:
         if not HEIC.fullmatch(path.suffix):
             found.append(path)
@@ -159,6 +165,8 @@ def _stills(paths: Sequence[Path], room: Path) -> list[Path]:
             found.append(as_png(path, own))
         except HeicMissing as error:
             raise Refusal(f"{path}: {error}.", LACKING) from error
-        except PictureError:
-            found.append(path)  # it is named and skipped where the board is looked for
-    return found
+        except PictureError as error:
+            notes.append(f"{path.name}: skipped, {error.why}.")
+    if notes and not found:
+        raise Refusal(f"none of the pictures can be used: {notes[0]}")
+    return found, notes

@@ -104,6 +104,7 @@ class Film:
         self.count = int(count) if 0 < count < 1e8 else 0
         self.turned_deg = int(told(cv2.CAP_PROP_ORIENTATION_META)) % 360
         self.notes: list[str] = []
+        self._cut = False
 
     def __enter__(self) -> Self:
         return self
@@ -128,7 +129,7 @@ class Film:
         if held is None:
             raise FilmError(self.path, "the film is damaged: not one of its frames can be read")
         self.notes += self._told(np.array(times))
-        if not self._breaks_off(times):
+        if not self._cut:
             yield held
 
     def _next(self, number: int) -> Frame | None:
@@ -167,7 +168,13 @@ class Film:
                 f"{missing} of its {self.count} frames cannot be read, the first after frame {lost} "
                 f"({times[min(lost, len(times) - 1)]:.2f} s), where the film is damaged; the others were used."
             )
+        elif self._breaks_off(list(times)) and _whole(self.path):
+            told.append(
+                f"frame {len(times) - 1} of {self.count} ({times[-1]:.2f} s) is the last that can be read: the film "
+                "was trimmed, or is damaged behind it."
+            )
         elif self._breaks_off(list(times)):
+            self._cut = True
             told.append(
                 f"the film ends at frame {len(times) - 1} of {self.count} ({times[-1]:.2f} s), where it is damaged or "
                 "was interrupted; what comes before was used."
@@ -203,7 +210,7 @@ def _refuse_no_film(path: Path) -> None:
         raise FilmError(path, "it is empty, expected a film")
     if not _CONTAINERS.match(head):
         raise FilmError(path, f"it is not a film that can be read, it begins with {head[:8].hex(' ')}")
-    if head[4:8] in _BOXED and b"moov" not in boxes(path):
+    if head[4:8] in _BOXED and b"moov" not in boxes(path)[0]:
         raise FilmError(
             path,
             "the recording was interrupted before the camera wrote the film's index (moov), so that not one frame can "
@@ -211,17 +218,25 @@ def _refuse_no_film(path: Path) -> None:
         )
 
 
-def boxes(path: Path) -> list[bytes]:
-    """The outermost boxes of an MP4 or QuickTime film, by their names (ISO/IEC 14496-12, section 4.2).
+def _whole(path: Path) -> bool:
+    """Whether a film is an MP4 or QuickTime whose boxes all end within it: nothing was cut off."""
+    names, end = boxes(path)
+    return names[:1] != [] and names[0] in _BOXED and end <= path.stat().st_size
+
+
+def boxes(path: Path) -> tuple[list[bytes], int]:
+    """The outermost boxes of an MP4 or QuickTime film (ISO/IEC 14496-12, section 4.2).
 
     Args:
         path: The film.
 
-    Returns: In the order of the file, as far as they begin within it.
+    Returns:
+        names: In the order of the file, as far as they begin within it.
+        end: Where the last one ends, in bytes, which may be behind the file's end.
 
     >>> _ = Path("cut.mp4").write_bytes(b"\\0\\0\\0\\x10ftypisom\\0\\0\\0\\0" + b"\\0\\0\\xff\\xffmdat")
     >>> boxes(Path("cut.mp4"))
-    [b'ftyp', b'mdat']
+    ([b'ftyp', b'mdat'], 65551)
     """
     found: list[bytes] = []
     with path.open("rb") as file:
@@ -237,7 +252,7 @@ def boxes(path: Path) -> list[bytes]:
             if length < 8:  # 0: as far as the file goes
                 break
             at += length
-    return found
+    return found, at
 
 
 def broken_chunk(path: Path) -> int | None:

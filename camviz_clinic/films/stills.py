@@ -38,15 +38,19 @@ def as_png(path: str | PathLike[str], folder: str | PathLike[str]) -> Path:
         HeicMissing: Without pillow-heif.
         PictureError: For a file that is no such still, is damaged, or too large.
     """
-    turned = _opened(path)
-    exif = turned.getexif()
+    opened = _plugin()
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            turned.load()
-    except Exception as error:  # of many kinds, from OSError to ValueError
-        raise PictureError(path, "the HEIC picture is cut off or damaged") from error
-    orientation = turned.info.get("original_orientation") or 1
+        with Path(path).open("rb") as file:
+            turned = opened(file)
+            _refuse_large(path, turned)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                turned.load()
+    except PictureError:
+        raise
+    except Exception as error:  # of many kinds, from SyntaxError to OSError
+        raise PictureError(path, "it is not a HEIC picture, or it is cut off or damaged") from error
+    orientation, exif = turned.info.get("original_orientation") or 1, turned.getexif()
     picture = turned.transpose(_transposition(orientation)) if orientation in _UNDONE else turned
     exif[_ORIENTATION] = orientation
     written = Path(folder) / f"{Path(path).stem}.png"
@@ -54,27 +58,21 @@ def as_png(path: str | PathLike[str], folder: str | PathLike[str]) -> Path:
     return written
 
 
-def _opened(path: str | PathLike[str]) -> Any:
-    """Pillow's picture of the file, of which nothing is decoded yet."""
-    from PIL import UnidentifiedImageError
-
+def _plugin() -> Any:
+    """Pillow's reader of HEIC, which decodes nothing until it is asked to."""
     try:
-        from pillow_heif import HeifImagePlugin
+        from pillow_heif import HeifImageFile
     except ImportError as error:
         raise HeicMissing(MISSING) from error
-    try:
-        picture = HeifImagePlugin.HeifImageFile(str(path))
-    except (UnidentifiedImageError, SyntaxError, ValueError, EOFError, RuntimeError) as error:
-        raise PictureError(path, "it is not a HEIC picture, or cut off") from error
-    except OSError as error:
-        raise PictureError(path, f"it cannot be read ({error.strerror or error})") from error
-    megapixels = picture.width * picture.height / 1e6
-    if megapixels > most_megapixels():
+    return HeifImageFile
+
+
+def _refuse_large(path: str | PathLike[str], picture: Any) -> None:
+    megapixels, most = picture.width * picture.height / 1e6, most_megapixels()
+    if megapixels > most:
         raise PictureError(
-            path,
-            f"it has {megapixels:.4g} megapixels, expected at most {most_megapixels():g} (--megapixels allows more)",
+            path, f"it has {megapixels:.4g} megapixels, expected at most {most:g} (--megapixels allows more)"
         )
-    return picture
 
 
 def _transposition(orientation: int) -> Any:

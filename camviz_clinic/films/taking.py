@@ -43,7 +43,7 @@ class Chosen:
 
 
 @dataclass(frozen=True)
-class Plan:
+class Choice:
     """How frames are chosen: what `chosen_frames` takes beside films and a folder."""
 
     board: Board
@@ -94,7 +94,7 @@ def chosen_frames(
     """
     if frames < 1:
         raise ValueError(f"frames must be at least 1, got {frames}")
-    plan = Plan(board, frames, model, held, fixed, search)
+    plan = Choice(board, frames, model, held, fixed, search)
     found, notes = _candidates(takes, Path(folder), plan, reading)
     left, showing = _choose(found, plan, looking)
     for place, candidate in enumerate(found):
@@ -110,7 +110,7 @@ def chosen_frames(
 
 
 def _candidates(
-    takes: Sequence[Mapping[str, Path_]], folder: Path, plan: Plan, reading: Step | None
+    takes: Sequence[Mapping[str, Path_]], folder: Path, plan: Choice, reading: Step | None
 ) -> tuple[list[FilmedMoment], list[str]]:
     """The moments of all takes that are looked at, and what was noted of the films."""
     labels = _labels([Path(path) for take in takes for path in take.values()])
@@ -137,7 +137,7 @@ def _labels(paths: Sequence[Path]) -> dict[Path, str]:
     return named
 
 
-def _choose(found: Sequence[FilmedMoment], plan: Plan, looking: Step | None) -> tuple[list[int], dict[str, int]]:
+def _choose(found: Sequence[FilmedMoment], plan: Choice, looking: Step | None) -> tuple[list[int], dict[str, int]]:
     """The chosen candidates' places, and by camera how many show the board."""
     names = dict.fromkeys(name for each in found for name in each.pictures)
     total, begun = sum(len(each.pictures) for each in found), 0

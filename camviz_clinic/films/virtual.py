@@ -100,7 +100,8 @@ def take(
 ) -> Take:
     """The board carried between poses all over the middle `window` of the picture.
 
-    In the pictures of the `others` as well, which stand in the first camera's frame. It rests at each for `rest_s` on average, some long and some hardly, and takes `way_s` to the next.
+    All poses lie in the pictures of the `others` as well, which stand in the first camera's frame. The board rests at
+    each for `rest_s` on average, at some long and at some hardly, and takes `way_s` to the next.
     """
     poses = spread_boards(rng, (camera, *others), board, stops, TILT_DEG, window)
     upright = [_upright(pose, board) for pose in poses]
