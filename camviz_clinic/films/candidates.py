@@ -184,7 +184,7 @@ def _small(gray: NDArray[np.uint8]) -> NDArray[np.float32]:
     scale = min(SIDE / max(gray.shape), 1)
     size = (round(gray.shape[1] * scale), round(gray.shape[0] * scale))
     small = cv2.resize(gray, size, interpolation=cv2.INTER_AREA) if scale < 1 else gray
-    return small.astype(np.float32) / 255
+    return np.asarray(small, np.float32) / np.float32(255)
 
 
 def _written(moment: _Judged, films: Mapping[str, Film], folder: Path) -> FilmedMoment:

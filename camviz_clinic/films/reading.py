@@ -80,7 +80,7 @@ class Film:
     >>> example("film.avi")  # a board, carried before a virtual camera
     >>> with Film("film.avi") as film:
     ...     print(film.width, film.height, len(list(film.frames())), film.notes)
-    160 120 6 []
+    160 120 18 []
     """
 
     def __init__(self, path: str | PathLike[str], label: str = "") -> None:
@@ -105,6 +105,7 @@ class Film:
         self.turned_deg = int(told(cv2.CAP_PROP_ORIENTATION_META)) % 360
         self.notes: list[str] = []
         self._cut = False
+        self._began = 0.0
 
     def __enter__(self) -> Self:
         return self

@@ -131,7 +131,7 @@ def write_film(path: Path, take: Take, rng: np.random.Generator, code: str = "MJ
 
 
 def example(path: str) -> None:
-    """A film of six frames, for examples."""
+    """A film of eighteen frames, for examples."""
     rng = np.random.default_rng(1)
     camera, board = Camera(Intrinsics.from_fov(160, 120, 60)), Board(4, 3, 0.05)
     write_film(Path(path), replace(take(rng, camera, board, 2, way_s=0.2), rate=10), rng)
