@@ -21,7 +21,6 @@ from camviz_clinic.rigs.start import MOST_ALONE, board_poses, varied
 Indices = NDArray[np.intp]
 
 ROUGH = 1e-6  # of the sum of squares, what a step of a pose must still promise
-CONTRADICTS = 4.0  # times the σ² of most: such a view would be set aside, and is chosen only where there are few
 FAINT = 1e-3  # of what all views say together: what is taken as known before the first one is chosen
 
 
@@ -56,10 +55,7 @@ def most_telling(
         return tuple(places)
     problem = _solved(found, board, model, held, fixed)
     views = np.flatnonzero(problem.posed)
-    noise = _noise(problem)[views]
-    agree = np.flatnonzero(noise <= CONTRADICTS * noise.min())
-    kept = agree if len(agree) >= count else np.arange(len(views))
-    chosen = kept[greedy(problem.by_view.information[kept], noise[kept], count, problem.by_priors[0])]
+    chosen = greedy(problem.by_view.information, _noise(problem)[views], count, sum(problem.by_priors[:1]))
     return tuple(sorted(places[view] for view in views[chosen]))
 
 
