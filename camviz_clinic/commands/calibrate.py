@@ -9,8 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from camviz.lenses import calibration_models
 from camviz_clinic.commands.boards import add_board, board_of
 from camviz_clinic.commands.common import (
@@ -30,6 +28,7 @@ from camviz_clinic.commands.common import (
     write_whole,
 )
 from camviz_clinic.commands.corners import add_corners, corners_of
+from camviz_clinic.commands.films import FILMS, add_frames, as_pictures
 from camviz_clinic.commands.gate import EPILOG as GATE
 from camviz_clinic.commands.gate import add_gate, given_gate, refuse_junit, write_junit
 from camviz_clinic.commands.pictures import Bar, pictures
@@ -43,6 +42,7 @@ from camviz_clinic.commands.rig import (
     rig_of_pictures,
     usual_name,
 )
+from camviz_clinic.commands.telling import report, worth
 
 if TYPE_CHECKING:
     from camviz_clinic.calibration import CannotCalibrate, Detections
@@ -69,6 +69,7 @@ MODELS = {name: model.says for name, (_, model) in calibration_models().items()}
 EXAMPLES = """\
 examples:
   camviz calibrate left*.jpg --board 9x6 --square-mm 25 --report report.html
+  camviz calibrate film.mp4 --frames 20 --board 9x6 --square-mm 25
   camviz calibrate --corners corners.vnl --board 9x6 --square-mm 25 --size 640x480
   camviz calibrate --corners left.vnl --right right.vnl --board 9x6 --square-mm 25 --size 640x480
   camviz calibrate left/ --right right/ --board 9x6 --square-mm 25 -o stereo.yaml
@@ -89,15 +90,20 @@ FINDERS = ("auto", "sectors", "classic")
 
 def add(commands: Any) -> None:
     command = add_command(
-        commands, "calibrate", calibrate, "calibrate a camera, a pair or a rig from pictures", f"{CALIBRATE}\n{RIG}"
+        commands,
+        "calibrate",
+        calibrate,
+        "calibrate a camera, a pair or a rig from pictures or films",
+        f"{CALIBRATE}\n{FILMS}\n{RIG}",
     )
     models = "".join(f"  {name:11} {says}\n" for name, says in MODELS.items())
     command.epilog = f"models:\n{models}\n{EXAMPLES}\n{GATE}\n{STATUS}"
-    command.add_argument("images", metavar="IMAGES", nargs="*", help="pictures, folders of them, or patterns")
+    command.add_argument("images", metavar="IMAGES", nargs="*", help="pictures, films, folders of them, or patterns")
     command.add_argument(
         "--right", metavar="IMAGES", nargs="+", help="those of the right camera, or files of its corners"
     )
     add_rig(command)
+    add_frames(command)
     add_board(command, required=False, default=False)
     add_corners(command)
     add_baseline(command)
@@ -141,11 +147,19 @@ def add_seconds(command: argparse.ArgumentParser) -> None:
 
 def calibrate(options: argparse.Namespace) -> int:
     """Detect, solve and write the calibration, whole or not at all; inspect it where that is asked for."""
+    _refuse_words(options)
+    with as_pictures(
+        options, {"model": options.model, "fixed": _how(options)["fixed"], "search": _search(options)}
+    ) as said:
+        return _of_stills(options, said)
+
+
+def _of_stills(options: argparse.Namespace, of_films: tuple[str, ...]) -> int:
+    """The same of pictures, with what is to be said of the films that they are from."""
     from camviz_clinic.calibration import CannotCalibrate
     from camviz_clinic.checks import inspect
     from camviz_clinic.files import CalibrationError
 
-    _refuse_words(options)
     left, right = pictures(options.images) if options.images else [], _right(options)
     cameras = by_camera(options.rig, pictures) if options.rig else {"left": left, "right": right}
     shots = [path for paths in cameras.values() for path in paths]
@@ -161,6 +175,7 @@ def calibrate(options: argparse.Namespace) -> int:
         calibration = _of_corners(left, right, options) if options.corners else _of_pictures(cameras, options)
     except CannotCalibrate as error:
         raise Refusal(_complaint(error, shots, options)) from error
+    calibration = replace(calibration, notes=(*of_films, *calibration.notes))
     calibration = _stamped(calibration, list(cameras.values()), options)
     try:
         left_out = write_calibration(calibration, options.output, form)
@@ -295,39 +310,6 @@ def _page(inspection: Inspection, folders: Mapping[str, Path], page: Path) -> No
     from camviz_clinic.report.inspection import write_report
 
     write_whole(page, lambda path: write_report(inspection, path, images=folders))
-
-
-def report(calibration: Calibration) -> list[str]:
-    """What came out, in sentences."""
-    said = [f"{picture}: skipped, {why}." for picture, why in calibration.skipped]
-    said += calibration.notes
-    for name, camera in calibration.cameras.items():
-        deviations = np.sqrt(np.diag(calibration.intrinsics_covariance[name]))
-        of = dict(zip(calibration.estimated[name], deviations, strict=True))
-        grid = camera.intrinsics
-        values = [
-            f"{key} = {getattr(grid, key):.2f}" + (f" ± {of[key]:.2f}" if key in of else "")
-            for key in ("fx", "fy", "cx", "cy")
-        ]
-        used = calibration.used(name)
-        views = int(used.any(axis=1).sum())
-        said.append(
-            f"{name}: {', '.join(values)} px; RMS error {calibration.rms(name):.3f} px over {used.sum()} corners in "
-            f"{views} views."
-        )
-    if "right" in calibration.cameras:
-        x, y, z = 1000 * calibration.cameras["right"].centre
-        length = np.sqrt(x * x + y * y + z * z)
-        said.append(f"right stands {length:.2f} mm from left: x = {x:.2f}, y = {y:.2f}, z = {z:.2f} mm in its frame.")
-    return said
-
-
-def worth(calibration: Calibration, goal: float | None) -> list[str]:
-    """What it is worth to a task, and whether there are enough pictures."""
-    from camviz_clinic.checks.summary import GOOD, Summary
-
-    summary = Summary.of(calibration, goal=goal or GOOD)
-    return [*(each.sentence for each in summary.task), summary.guidance]
 
 
 def _single(paths: list[Path], board: Board, options: argparse.Namespace) -> Calibration:

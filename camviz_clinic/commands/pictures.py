@@ -14,15 +14,18 @@ from camviz_clinic.commands.common import Refusal
 PICTURES = re.compile(r"\.(bmp|dib|exr|hdr|jp2|jpe|jpeg|jpg|pbm|pgm|png|pnm|ppm|tif|tiff|webp)", re.IGNORECASE)
 
 
-def pictures(words: Sequence[str]) -> list[Path]:
-    """The files that words name: themselves, those of a folder, or those of a pattern; each once, in natural order."""
+def pictures(words: Sequence[str], endings: re.Pattern[str] = PICTURES) -> list[Path]:
+    """The files that words name: themselves, those of a folder, or those of a pattern; each once, in natural order.
+
+    Of a folder those whose names end in one of `endings`.
+    """
     found: dict[Path, None] = {}
     for word in words:
         if "\0" in word:
             raise Refusal(f"{word!r} is not a file name.")
         path = Path(word)
         if path.is_dir():
-            paths = sorted((each for each in path.iterdir() if PICTURES.fullmatch(each.suffix)), key=_natural)
+            paths = sorted((each for each in path.iterdir() if endings.fullmatch(each.suffix)), key=_natural)
             if not paths:
                 raise Refusal(f"{path}: there are no pictures in this folder.")
         elif path.exists():
@@ -46,6 +49,9 @@ class Bar:
 
     WIDTH = 30
 
+    def __init__(self, what: str = "pictures") -> None:
+        self.what = what
+
     def __enter__(self) -> Bar:
         self.shown = sys.stderr.isatty()
         return self
@@ -54,7 +60,7 @@ class Bar:
         if self.shown:
             full = self.WIDTH * done // count
             bar = "█" * full + "░" * (self.WIDTH - full)
-            line = f"\r{bar} {done} of {count} pictures".encode(sys.stderr.encoding, "replace")
+            line = f"\r{bar} {done} of {count} {self.what}".encode(sys.stderr.encoding, "replace")
             print(line.decode(sys.stderr.encoding), end="", file=sys.stderr, flush=True)
 
     def __exit__(self, *_: object) -> None:

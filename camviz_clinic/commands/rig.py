@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -81,7 +81,7 @@ def by_camera(words: Sequence[str], found: Callable[[Sequence[str]], list[Path]]
     paths = found(words)
     folders = list(dict.fromkeys(path.parent for path in paths))
     if len(folders) > 1:
-        called = _told_apart(folders)
+        called = told_apart(folders)
         return {called[folder]: [path for path in paths if path.parent == folder] for folder in folders}
     cameras: dict[str, list[Path]] = {}
     for path in paths:
@@ -94,7 +94,7 @@ def by_camera(words: Sequence[str], found: Callable[[Sequence[str]], list[Path]]
     return cameras
 
 
-def _told_apart(folders: Sequence[Path]) -> dict[Path, str]:
+def told_apart(folders: Sequence[Path]) -> dict[Path, str]:
     """The folders' names, and as much of what is above them as tells them apart."""
     for depth in range(1, max(len(folder.parts) for folder in folders) + 1):
         names = {folder: "/".join(folder.parts[-depth:]) or "." for folder in folders}
@@ -114,7 +114,7 @@ def rig_of_pictures(
     from camviz_clinic.calibration import CannotCalibrate
     from camviz_clinic.rigs import calibrate_rig, synchronised
 
-    models, held = _models(cameras, options), _held(cameras, options)
+    models, held = models_of(cameras, options), held_of(cameras, options)
     frames = synchronised(cameras)
     found = {}
     for name, paths in cameras.items():
@@ -133,7 +133,8 @@ def rig_of_pictures(
         raise Refusal(f"{error}.") from error
 
 
-def _models(cameras: Mapping[str, list[Path]], options: argparse.Namespace) -> dict[str, str]:
+def models_of(cameras: Iterable[str], options: argparse.Namespace) -> dict[str, str]:
+    """The model of each camera."""
     from camviz_clinic.calibration import MODELS
 
     models = dict.fromkeys(cameras, options.model)
@@ -144,7 +145,7 @@ def _models(cameras: Mapping[str, list[Path]], options: argparse.Namespace) -> d
     return models
 
 
-def _held(cameras: Mapping[str, list[Path]], options: argparse.Namespace) -> dict[str, Camera]:
+def held_of(cameras: Iterable[str], options: argparse.Namespace) -> dict[str, Camera]:
     """The cameras whose intrinsics files hold: that of the same name, or the only one."""
     held = {}
     for name, file in _assigned("--held", options.held, cameras):
@@ -155,7 +156,7 @@ def _held(cameras: Mapping[str, list[Path]], options: argparse.Namespace) -> dic
     return held
 
 
-def _assigned(option: str, words: Sequence[str], cameras: Mapping[str, list[Path]]) -> list[tuple[str, str]]:
+def _assigned(option: str, words: Sequence[str], cameras: Iterable[str]) -> list[tuple[str, str]]:
     pairs = []
     for word in words:
         name, equals, value = word.partition("=")

@@ -23,6 +23,7 @@ from camviz_clinic.checks.rig import lone_poses
 from camviz_clinic.checks.snapshots import snapshot
 from camviz_clinic.checks.virtual import spread_boards
 from camviz_clinic.files.writing import write as write_calibration
+from camviz_clinic.films.virtual import take, write_film
 from camviz_clinic.handeye.virtual import cell
 from camviz_clinic.rigs import virtual
 
@@ -31,6 +32,7 @@ LEFT = Camera(Intrinsics(640, 480, 530, 531, 322, 238), BrownConrady(-0.2, 0.05)
 RIGHT = Camera(Intrinsics(640, 480, 528, 528, 317, 241), BrownConrady(-0.21, 0.05)).at(
     RigidTransform.from_components([0.1, 0.001, 0], Rotation.from_rotvec([0.002, -0.01, 0.003]))
 )
+FILMING = Camera(Intrinsics(320, 240, 265, 266, 161, 119), BrownConrady(-0.1, 0.02))
 KNOCKED = replace(LEFT, intrinsics=replace(LEFT.intrinsics, fx=538, fy=539))
 VIEWS = 14
 NOISE = 10.0  # grey levels
@@ -80,6 +82,7 @@ def write(folder: Path) -> None:
     expose(folder / "frames", rng)
     shoot_rig(folder / "rig")
     robot(folder)
+    film(folder / "film.avi")
 
 
 def shoot(folder: Path, camera: Camera, cam_from_board: RigidTransform, rng: np.random.Generator) -> None:
@@ -115,6 +118,13 @@ def robot(folder: Path) -> None:
     rows = np.column_stack([1000 * hand.translation, hand.rotation.as_euler("ZYX", degrees=True)])
     lines = [f"{number:02}.png," + ",".join(f"{x:.4f}" for x in row) for number, row in enumerate(rows, 1)]
     (folder / "poses.csv").write_text("\n".join(["picture,X,Y,Z,A,B,C", *lines]) + "\n")
+
+
+def film(path: Path) -> None:
+    """Nine seconds of a board that is carried before a camera, and rests at times."""
+    rng = np.random.default_rng(20)
+    filmed = take(rng, FILMING, BOARD, 14, rest_s=0.2, way_s=0.4, rate=8.0)
+    write_film(path, filmed, rng, noise=3.0)
 
 
 def edge() -> np.ndarray:
