@@ -28,7 +28,7 @@ LAYERS = {
         ("calibration", "measuring"),
         ("files", "rigs"),
         ("checks",),
-        ("handeye", "views"),
+        ("datasets", "handeye", "views"),
         ("meshes", "plots", "report"),
         ("commands",),
     ),
@@ -45,7 +45,7 @@ LAYERS = {
 WHAT_IS_TRUE = (
     *("cameras", "colour", "distortion", "lenses", "lightfields", "mosaics"),
     *("optics", "panoramas", "poses", "scenes", "sensors", "twoview"),
-    *("calibration", "checks", "files", "handeye", "measuring", "rigs", "samples"),
+    *("calibration", "checks", "datasets", "files", "handeye", "measuring", "rigs", "samples"),
 )
 """Parts without drawing: none of them loads one of `HEAVY`."""
 

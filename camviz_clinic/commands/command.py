@@ -25,6 +25,7 @@ from camviz_clinic.commands import (
     noise,
     reproject,
     show,
+    undistort,
 )
 from camviz_clinic.commands.common import INTERRUPTED, OK, REFUSED, Parser, Refusal, did_you_mean, refuse_exhausted
 from camviz_clinic.commands.terminal import say
@@ -44,6 +45,8 @@ examples:
   camviz check camera.yaml new/*.jpg         say whether it still holds, by new pictures of the board
   camviz handeye camera.yaml poses.csv new/*.jpg
                                              find where the camera sits on a robot, and what is wrong with its poses
+  camviz undistort camera.yaml photos/ -o flat/
+                                             take the distortion out of photographs
   camviz show camera.yml                     write camera.html: open it in a browser, no network needed
   camviz show intrinsics.yml --size 640x480  the same, for a file that does not hold the image size
   camviz convert cam.yml model --to colmap   write the same camera for another program
@@ -65,7 +68,7 @@ exit status:
   4    camviz check cannot tell from these pictures
   130  interrupted (Ctrl-C); 143 ended by SIGTERM, 129 by a terminal that was closed
 """
-COMMANDS = (board, calibrate, inspect, check, handeye, show, convert, reproject, noise, mtf, completion)
+COMMANDS = (board, calibrate, inspect, check, handeye, undistort, show, convert, reproject, noise, mtf, completion)
 """The clinic's own. Other packages add theirs by an entry point of the group `camviz.commands`: a tuple of modules."""
 
 
