@@ -23,6 +23,7 @@ from camviz_clinic.commands import (
     inspect,
     mtf,
     noise,
+    poses,
     reproject,
     show,
     undistort,
@@ -45,6 +46,7 @@ examples:
   camviz check camera.yaml new/*.jpg         say whether it still holds, by new pictures of the board
   camviz handeye camera.yaml poses.csv new/*.jpg
                                              find where the camera sits on a robot, and what is wrong with its poses
+  camviz poses camera.yaml photos/           say where the camera stood for each photograph of its board
   camviz undistort camera.yaml photos/ -o flat/
                                              take the distortion out of photographs
   camviz show camera.yml                     write camera.html: open it in a browser, no network needed
@@ -68,7 +70,21 @@ exit status:
   4    camviz check cannot tell from these pictures
   130  interrupted (Ctrl-C); 143 ended by SIGTERM, 129 by a terminal that was closed
 """
-COMMANDS = (board, calibrate, inspect, check, handeye, undistort, show, convert, reproject, noise, mtf, completion)
+COMMANDS = (
+    board,
+    calibrate,
+    inspect,
+    check,
+    handeye,
+    poses,
+    undistort,
+    show,
+    convert,
+    reproject,
+    noise,
+    mtf,
+    completion,
+)
 """The clinic's own. Other packages add theirs by an entry point of the group `camviz.commands`: a tuple of modules."""
 
 
