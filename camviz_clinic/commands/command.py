@@ -19,6 +19,7 @@ from camviz_clinic.commands import (
     check,
     completion,
     convert,
+    dataset,
     handeye,
     inspect,
     mtf,
@@ -49,6 +50,8 @@ examples:
   camviz poses camera.yaml photos/           say where the camera stood for each photograph of its board
   camviz undistort camera.yaml photos/ -o flat/
                                              take the distortion out of photographs
+  camviz dataset photos/ --board 10x7 --square-mm 18 --charuco 5X5_100 -o scene/
+                                             make a posed dataset of photographs, for nerfstudio, COLMAP and NumPy
   camviz show camera.yml                     write camera.html: open it in a browser, no network needed
   camviz show intrinsics.yml --size 640x480  the same, for a file that does not hold the image size
   camviz convert cam.yml model --to colmap   write the same camera for another program
@@ -78,6 +81,7 @@ COMMANDS = (
     handeye,
     poses,
     undistort,
+    dataset,
     show,
     convert,
     reproject,
