@@ -15,7 +15,12 @@ def files(tmp_path_factory):
     return folder
 
 
-LONG = ("calibrate-a-rig", "from-a-phone-to-a-dataset", "find-a-camera-on-a-robot", "is-it-still-valid")  # a quarter of a minute or more each: with --all
+LONG = (
+    "calibrate-a-rig",
+    "from-a-phone-to-a-dataset",
+    "find-a-camera-on-a-robot",
+    "is-it-still-valid",
+)  # a quarter of a minute or more each: with --all
 
 
 PAGES = [

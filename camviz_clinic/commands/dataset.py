@@ -32,7 +32,7 @@ from camviz_clinic.commands.undistort import (
 
 if TYPE_CHECKING:
     from camviz_clinic.calibration import Board, Calibration, Detections
-    from camviz_clinic.datasets.poses import PosedPictures
+    from camviz_clinic.datasets.poses import CameraPoses
     from camviz_clinic.datasets.undistortion import Undistortion
 
 DATASET = """\
@@ -112,7 +112,7 @@ def _solved(found: Detections, board: Board, options: argparse.Namespace) -> Cal
 
 
 def _write(
-    folder: Path, flat: Undistortion, posed: PosedPictures, names: dict[Path, str], calibration: Calibration
+    folder: Path, flat: Undistortion, posed: CameraPoses, names: dict[Path, str], calibration: Calibration
 ) -> None:
     """Everything into a folder that has no name yet."""
     from camviz_clinic.calibration import CalibrationError

@@ -27,7 +27,7 @@ from camviz_clinic.commands.pictures import Bar, pictures
 
 if TYPE_CHECKING:
     from camviz_clinic.calibration import Board, Calibration, Detections
-    from camviz_clinic.datasets.poses import PosedPictures
+    from camviz_clinic.datasets.poses import CameraPoses
 
 POSES = """\
 Finds the board, or its tags, in each picture, and says where the camera stood and looked, with the standard deviation
@@ -122,7 +122,7 @@ def looked(paths: Sequence[Path], board: Board, options: argparse.Namespace) -> 
 
 def posed_pictures(
     calibration: Calibration, options: argparse.Namespace, board: Board, paths: Sequence[Path]
-) -> PosedPictures:
+) -> CameraPoses:
     """The poses of pictures by the chosen camera."""
     camera, found = chosen_camera(calibration, options), looked(paths, board, options)
     grid = camera.intrinsics
@@ -135,7 +135,7 @@ def posed_pictures(
     return poses_of(calibration, name, board, found)
 
 
-def poses_of(calibration: Calibration, name: str, board: Board, found: Detections) -> PosedPictures:
+def poses_of(calibration: Calibration, name: str, board: Board, found: Detections) -> CameraPoses:
     """The poses of what was found, with the camera's own uncertainty where the calibration holds it."""
     from camviz_clinic.datasets.poses import NoPose, find_poses
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from camviz.cameras import Camera
 from camviz_clinic.calibration.types import Calibration
-from camviz_clinic.datasets.poses import PosedPictures
+from camviz_clinic.datasets.poses import CameraPoses
 from camviz_clinic.files.output import as_json
 from camviz_clinic.files.writing import write
 
@@ -19,7 +19,7 @@ TRANSFORMS, MODEL, ARCHIVE = "transforms.json", Path("sparse/0"), "poses.npz"
 
 
 def write_poses(
-    folder: Path, pinhole: Camera, posed: PosedPictures, files: list[str], images: str, mask: str | None
+    folder: Path, pinhole: Camera, posed: CameraPoses, files: list[str], images: str, mask: str | None
 ) -> None:
     """Write transforms.json, sparse/0 and poses.npz into a folder; the world is the board's frame, in metres.
 
@@ -51,7 +51,7 @@ def _name_mask(path: Path, mask: str) -> None:
     path.write_bytes(as_json(tree))
 
 
-def archive(pinhole: Camera, posed: PosedPictures, files: list[str]) -> bytes:
+def archive(pinhole: Camera, posed: CameraPoses, files: list[str]) -> bytes:
     """The poses as arrays, with x right, y down, z forward in the camera and the first pixel's centre at (0, 0).
 
     Of n pictures: `names` (n,), `world_from_cam` (n, 4, 4), `cam_from_world` (n, 4, 4), `covariance` (n, 6, 6) of

@@ -44,7 +44,7 @@ class NoPose(ValueError):  # noqa: N818 - it says what is the case
 
 
 @dataclass(frozen=True, eq=False)
-class PosedPictures:
+class CameraPoses:
     """Pictures of a board, and where the camera stood; the world is the board's frame.
 
     Args:
@@ -110,7 +110,7 @@ def find_poses(
     detections: Detections,
     estimated: tuple[str, ...] = (),
     covariance: Array | None = None,
-) -> PosedPictures:
+) -> CameraPoses:
     """The pose of a camera in each picture of a board, with its covariance.
 
     Args:
@@ -148,15 +148,16 @@ def find_poses(
         raise NoPose(f"none of the pictures has a pose: {refused[0][1]} ({refused[0][0]})")
     solved = solved.only(kept)
     counted = covariance is not None and len(estimated) > 0
+    of_camera = np.zeros((0, 0)) if covariance is None or not counted else covariance
     if counted:
         solved = replace(solved, estimated={"camera": estimated})
-    return PosedPictures(
+    return CameraPoses(
         board,
         alone,
         tuple(name for name, keep in zip(detections.pictures, kept, strict=True) if keep),
         tuple(place for place, keep in zip(detections.places, kept, strict=True) if keep),
         solved.first_from_board,
-        _covariance(solved, covariance if counted else np.zeros((0, 0))),
+        _covariance(solved, of_camera),
         np.sqrt(_squares(solved) / solved.used["camera"].sum(axis=1)),
         solved.used["camera"].sum(axis=1),
         _sigma(solved),

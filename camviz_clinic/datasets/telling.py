@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from camviz_clinic.datasets.poses import PosedPictures
+from camviz_clinic.datasets.poses import CameraPoses
 from camviz_clinic.files.output import as_rows
 
 HEADER = (
@@ -18,7 +18,7 @@ HEADER = (
 WORLD = "the board: origin at its first point, x along the rows, y down the columns, z into the board; metres"
 
 
-def sentences(posed: PosedPictures) -> list[str]:
+def sentences(posed: CameraPoses) -> list[str]:
     """Who was refused, how well the others are known, and what the ± is."""
     place, turn = 1000 * posed.place_sigma.max(axis=1), np.degrees(posed.turn_sigma.max(axis=1))
     typical, worst = np.argsort(place)[len(place) // 2], np.argmax(place)
@@ -34,7 +34,7 @@ def sentences(posed: PosedPictures) -> list[str]:
     ]
 
 
-def as_table(posed: PosedPictures) -> bytes:
+def as_table(posed: CameraPoses) -> bytes:
     """One picture a row: board_from_cam with its standard deviations (CSV)."""
     pose = posed.board_from_cam
     numbers = np.column_stack(
@@ -51,7 +51,7 @@ def _cell(name: str) -> str:
     return '"' + name.replace('"', '""') + '"' if set(name) & set(',"\n') else name
 
 
-def as_tree(posed: PosedPictures) -> dict[str, Any]:
+def as_tree(posed: CameraPoses) -> dict[str, Any]:
     """The same with matrices and covariances, for programs."""
     return {
         "world": WORLD,
