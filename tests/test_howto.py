@@ -15,12 +15,12 @@ def files(tmp_path_factory):
     return folder
 
 
-LONG = (
+LONG = (  # a quarter of a minute or more each: with --all
     "calibrate-a-rig",
-    "from-a-phone-to-a-dataset",
     "find-a-camera-on-a-robot",
+    "from-a-phone-to-a-dataset",
     "is-it-still-valid",
-)  # a quarter of a minute or more each: with --all
+)
 
 
 PAGES = [

@@ -64,7 +64,7 @@ cam0:
 
 
 def write(folder: Path) -> None:
-    """left/, right/, later/, knocked/, rig/ and phone/ show a board, two files are solved from them, others stand beside."""
+    """left/, right/, later/, knocked/, rig/ and phone/ show a board, two files are solved from them."""
     rng = np.random.default_rng(18)
     together, later = (spread_boards(rng, seen_by, BOARD, VIEWS, (15, 40)) for seen_by in ((LEFT, RIGHT), (KNOCKED,)))
     shoot(folder / "left", LEFT, together, rng)
