@@ -28,7 +28,7 @@ LAYERS = {
         ("calibration", "measuring"),
         ("files", "rigs"),
         ("checks",),
-        ("films", "handeye", "views"),
+        ("datasets", "films", "handeye", "views"),
         ("meshes", "plots", "report"),
         ("commands",),
     ),
@@ -45,7 +45,7 @@ LAYERS = {
 WHAT_IS_TRUE = (
     *("cameras", "colour", "distortion", "lenses", "lightfields", "mosaics"),
     *("optics", "panoramas", "poses", "scenes", "sensors", "twoview"),
-    *("calibration", "checks", "files", "films", "handeye", "measuring", "rigs", "samples"),
+    *("calibration", "checks", "datasets", "files", "films", "handeye", "measuring", "rigs", "samples"),
 )
 """Parts without drawing: none of them loads one of `HEAVY`."""
 

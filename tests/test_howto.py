@@ -15,8 +15,13 @@ def files(tmp_path_factory):
     return folder
 
 
-LONG = ("calibrate-a-rig", "calibrate-from-a-film", "find-a-camera-on-a-robot", "is-it-still-valid")
-"""A quarter of a minute each: with --all."""
+LONG = (  # a quarter of a minute or more each: with --all
+    "calibrate-a-rig",
+    "calibrate-from-a-film",
+    "find-a-camera-on-a-robot",
+    "from-a-phone-to-a-dataset",
+    "is-it-still-valid",
+)
 
 
 PAGES = [
@@ -33,7 +38,7 @@ def test_the_commands_of_a_page_print_what_it_shows(page, files):
 def test_there_is_a_page_for_each_task():
     index = (console.HERE / "README.md").read_text(encoding="utf-8")
     assert [page.name for page in console.pages() if f"]({page.name})" not in index] == []
-    assert len(console.pages()) == 14
+    assert len(console.pages()) == 15
 
 
 @pytest.mark.parametrize(

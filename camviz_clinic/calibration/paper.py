@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import floor
 
 import numpy as np
@@ -16,6 +16,8 @@ from camviz_clinic.calibration.types import Board
 PAPERS = {"a4": (210.0, 297.0), "a3": (297.0, 420.0), "letter": (215.9, 279.4)}  # millimetres
 MARGIN, STRIP = 8.0, 27.0  # millimetres: white around the board, and below it where the ruler and the words are
 RULER = 100.0
+BY_EYE = 0.35  # millimetres: how well a ruler is read
+FITTED = (("A4", "Letter"), ("Letter", "A4"))
 LARGEST = 5000.0  # millimetres; PDF ends at 200 inches
 POINTS = 72 / 25.4  # per millimetre
 
@@ -117,6 +119,31 @@ def fitted(board: Board, paper: str = "a4") -> PrintedBoard:
         f"a {kind.says(board)}, {kind.measures(board)}, is {wide:g} × {high:g} mm, too large for the paper {paper}: "
         f"{would} a paper of {_up(wide + 2 * MARGIN)}x{_up(high + MARGIN + STRIP)}-mm"
     )
+
+
+def as_printed(board: Board, ruler_mm: float) -> Board:
+    """The board of a sheet whose ruler measures `ruler_mm` in place of 100 mm."""
+    scale = ruler_mm / RULER
+    marker = None if board.marker_size is None else scale * board.marker_size
+    return replace(board, square_size=scale * board.square_size, marker_size=marker)
+
+
+def told_by_ruler(board: Board, ruler_mm: float) -> str:
+    """What the ruler of a printed sheet tells of its printing, and of the board."""
+    kind, printed = kind_of(board), as_printed(board, ruler_mm)
+    if abs(ruler_mm - RULER) < BY_EYE:
+        why = "it was printed at true scale"
+    else:
+        lengths = {pair: RULER * _fit(*(PAPERS[name.lower()] for name in pair)) for pair in FITTED}
+        pairs = (pair for pair, length in lengths.items() if abs(ruler_mm - length) < BY_EYE)
+        made = " and fitted to ".join(next(pairs, ()))
+        why = f"the sheet was made for {made}" if made else "it was not printed at 100 %"
+    return f"The ruler measures {ruler_mm:g} mm: {why}, and its {kind.sized} are {1000 * kind.size(printed):.4g} mm."
+
+
+def _fit(sheet: tuple[float, float], paper: tuple[float, float]) -> float:
+    """How much smaller a sheet is printed, to fit on another paper."""
+    return min(paper[0] / sheet[0], paper[1] / sheet[1])
 
 
 def paper_size(paper: str) -> tuple[float, float]:

@@ -19,12 +19,15 @@ from camviz_clinic.commands import (
     check,
     completion,
     convert,
+    dataset,
     handeye,
     inspect,
     mtf,
     noise,
+    poses,
     reproject,
     show,
+    undistort,
 )
 from camviz_clinic.commands.common import INTERRUPTED, OK, REFUSED, Parser, Refusal, did_you_mean, refuse_exhausted
 from camviz_clinic.commands.terminal import say
@@ -44,6 +47,11 @@ examples:
   camviz check camera.yaml new/*.jpg         say whether it still holds, by new pictures of the board
   camviz handeye camera.yaml poses.csv new/*.jpg
                                              find where the camera sits on a robot, and what is wrong with its poses
+  camviz poses camera.yaml photos/           say where the camera stood for each photograph of its board
+  camviz undistort camera.yaml photos/ -o flat/
+                                             take the distortion out of photographs
+  camviz dataset photos/ --board 10x7 --square-mm 18 --charuco 5X5_100 -o scene/
+                                             make a posed dataset of photographs, for nerfstudio, COLMAP and NumPy
   camviz show camera.yml                     write camera.html: open it in a browser, no network needed
   camviz show intrinsics.yml --size 640x480  the same, for a file that does not hold the image size
   camviz convert cam.yml model --to colmap   write the same camera for another program
@@ -65,7 +73,22 @@ exit status:
   4    camviz check cannot tell from these pictures
   130  interrupted (Ctrl-C); 143 ended by SIGTERM, 129 by a terminal that was closed
 """
-COMMANDS = (board, calibrate, inspect, check, handeye, show, convert, reproject, noise, mtf, completion)
+COMMANDS = (
+    board,
+    calibrate,
+    inspect,
+    check,
+    handeye,
+    poses,
+    undistort,
+    dataset,
+    show,
+    convert,
+    reproject,
+    noise,
+    mtf,
+    completion,
+)
 """The clinic's own. Other packages add theirs by an entry point of the group `camviz.commands`: a tuple of modules."""
 
 

@@ -21,6 +21,7 @@ from camviz_clinic.commands.terminal import say, tell
 if TYPE_CHECKING:
     import numpy as np
 
+    from camviz.cameras import Camera
     from camviz_clinic.calibration.types import Calibration
 
 OK, FOUND, REFUSED, LACKING, INTERRUPTED = 0, 1, 2, 3, 130
@@ -102,6 +103,42 @@ def loaded(path: Path, size: tuple[int, int] | None) -> Calibration:
             return load(file, size=size)
         except CalibrationError as error:
             raise Refusal(str(error)) from error
+
+
+def chosen_camera(calibration: Calibration, options: argparse.Namespace) -> Camera:
+    """The camera that --camera names, or the only one of the calibration."""
+    names = list(calibration.cameras)
+    if options.camera is None and len(names) > 1:
+        raise Refusal(
+            f"{options.calibration}: the cameras are {', '.join(names)}: say with --camera which one took the pictures."
+        )
+    name = options.camera or names[0]
+    if name not in names:
+        raise Refusal(f"{options.calibration}: expected --camera to be one of {', '.join(names)}, got {name}.")
+    return calibration.cameras[name]
+
+
+@contextmanager
+def whole_folder(output: Path) -> Iterator[Path]:
+    """A folder to write into, which takes the name `output` when all is done; of a failure nothing stays.
+
+    Raises Refusal where the name is that of something else than an empty folder, or cannot be had.
+    """
+    refuse_folder(output)
+    target = output.resolve()
+    try:
+        with TemporaryDirectory(dir=target.parent, prefix=".camviz-") as room:
+            part = Path(room) / "part"
+            part.mkdir()
+            yield part
+            if target.exists():
+                target.rmdir()
+            os.replace(part, target)
+    except BrokenPipeError:
+        raise
+    except OSError as error:  # whose file name is that of the part
+        refuse_exhausted(error)
+        raise Refusal(f"{output}: cannot be written ({error.strerror or error}).") from error
 
 
 @contextmanager
@@ -189,6 +226,21 @@ def refuse_output(output: Path, what: str, *sources: Path) -> None:
     for source in sources:
         if output.exists() and source.exists() and output.samefile(source):
             raise Refusal(f"{output}: this would overwrite {source}; choose another name with -o.")
+
+
+def refuse_folder(output: Path) -> None:
+    """Refuses a name under which no new folder can be written."""
+    if "\0" in str(output):
+        raise Refusal(f"{str(output)!r} is not a file name.")
+    if output == STREAM:
+        raise Refusal("-: a folder is written, which stdout cannot hold; name it with -o.")
+    if output.exists() and not (output.is_dir() and not any(output.iterdir())):
+        raise Refusal(f"{output}: expected the name of a new folder, or of an empty one.")
+    parent = output.resolve().parent
+    if not parent.is_dir():
+        raise Refusal(f"{output}: there is no directory {parent} to write into.")
+    if not os.access(parent, os.W_OK):
+        raise Refusal(f"{output}: cannot be written (the directory {parent} is not yours to write into).")
 
 
 def read_picture(path: Path) -> np.ndarray:

@@ -19,6 +19,7 @@ from camviz_clinic.commands.common import (
     add_colour,
     add_command,
     add_megapixels,
+    chosen_camera,
     loaded,
     narrator,
     refuse_output,
@@ -137,7 +138,7 @@ def _case(calibration: Calibration, options: argparse.Namespace) -> tuple[PosedP
             f"{options.calibration}: the file does not say which board was used: say which one the pictures show, such "
             "as --board 9x6 --square-mm 25."
         )
-    camera, paths = _camera(calibration, options), pictures(options.images)
+    camera, paths = chosen_camera(calibration, options), pictures(options.images)
     rows = _rows(poses, paths, options)
     try:
         with Bar() as bar:
@@ -181,18 +182,6 @@ def _pixels(found: Detections, board: Board, rows: list[int | None], count: int)
         if row is not None:
             pixels[row] = corners
     return pixels
-
-
-def _camera(calibration: Calibration, options: argparse.Namespace) -> Camera:
-    names = list(calibration.cameras)
-    if options.camera is None and len(names) > 1:
-        raise Refusal(
-            f"{options.calibration}: the cameras are {', '.join(names)}: say with --camera which one took the pictures."
-        )
-    name = options.camera or names[0]
-    if name not in names:
-        raise Refusal(f"{options.calibration}: expected --camera to be one of {', '.join(names)}, got {name}.")
-    return calibration.cameras[name]
 
 
 def _refuse_size(found: Detections, camera: Camera) -> None:

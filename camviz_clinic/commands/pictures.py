@@ -7,9 +7,12 @@ import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from camviz_clinic.commands.common import Refusal
+
+if TYPE_CHECKING:
+    import numpy as np
 
 PICTURES = re.compile(r"\.(bmp|dib|exr|hdr|jp2|jpe|jpeg|jpg|pbm|pgm|png|pnm|ppm|tif|tiff|webp)", re.IGNORECASE)
 
@@ -42,6 +45,22 @@ def pictures(words: Sequence[str], endings: re.Pattern[str] = PICTURES) -> list[
 def _natural(path: Path) -> tuple[Any, ...]:
     """left2 before left10."""
     return tuple(int(part) if part.isdigit() else part for part in re.split(r"([0-9]+)", path.name.lower()))
+
+
+def encoded(picture: np.ndarray, output: Path) -> bytes:
+    """What a picture's file holds by the ending of its name; Refusal for pixels that such a file cannot hold."""
+    import cv2
+    import numpy as np
+
+    if picture.dtype == np.uint16 and output.suffix.lower() not in (".png", ".tif", ".tiff"):
+        picture = (picture >> 8).astype(np.uint8)
+    try:
+        done, data = cv2.imencode(output.suffix, picture)
+    except cv2.error:
+        done = False
+    if not done:
+        raise Refusal(f"{output}: {output.suffix} cannot hold {picture.dtype} pixels; choose .png or .tif.")
+    return data.tobytes()
 
 
 class Bar:

@@ -18,6 +18,7 @@ from camviz_clinic.commands.common import (
     size,
     write_whole,
 )
+from camviz_clinic.commands.pictures import encoded
 from camviz_clinic.commands.terminal import tell
 
 if TYPE_CHECKING:
@@ -102,7 +103,7 @@ def reproject(options: argparse.Namespace) -> int:
     target = _target(options, source)
     target = target.at(turned(options.yaw, options.pitch, options.roll) * target.world_from_cam)
     seen = reprojected(picture, source, target, nothing=0.0 if picture.ndim == 3 and picture.shape[2] == 4 else None)
-    data = _encoded(_finished(seen, picture, options.output), options.output)
+    data = encoded(_finished(seen, picture, options.output), options.output)
     write_whole(options.output, lambda path: path.write_bytes(data))
     tell(f"{options.output}: written, {target.intrinsics.width} × {target.intrinsics.height} pixels, {options.target}.")
     return OK
@@ -227,18 +228,3 @@ def _require_writer(output: Path) -> None:
 
     if not output.suffix or not cv2.haveImageWriter(output.name):
         raise Refusal(f"{output}: expected a picture's name, ending in .png, .jpg, .tif or .webp.")
-
-
-def _encoded(picture: np.ndarray, output: Path) -> bytes:
-    import cv2
-    import numpy as np
-
-    if picture.dtype == np.uint16 and output.suffix.lower() not in (".png", ".tif", ".tiff"):
-        picture = (picture >> 8).astype(np.uint8)
-    try:
-        done, data = cv2.imencode(output.suffix, picture)
-    except cv2.error:
-        done = False
-    if not done:
-        raise Refusal(f"{output}: {output.suffix} cannot hold {picture.dtype} pixels; choose .png or .tif.")
-    return data.tobytes()

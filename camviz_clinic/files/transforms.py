@@ -119,6 +119,8 @@ def write(calibration: Calibration) -> bytes:
     """One set of intrinsics for all frames where they share it, otherwise one in each frame."""
     frames: list[dict[str, Any]] = []
     intrinsics = [_intrinsics(name, camera) for name, camera in calibration.cameras.items()]
+    if all(isinstance(camera.lens, Perspective) for camera in calibration.cameras.values()):
+        intrinsics = [_without_lens(each) for each in intrinsics]
     shared = intrinsics[0] if all(each == intrinsics[0] for each in intrinsics) else {}
     models = {each["camera_model"] for each in intrinsics}
     if len(models) > 1:
@@ -137,6 +139,11 @@ def _intrinsics(name: str, camera: Camera) -> dict[str, Any]:
     return {"camera_model": model.name, "w": grid.width, "h": grid.height, **held}
 
 
+def _without_lens(intrinsics: dict[str, Any]) -> dict[str, Any]:
+    """Those of a pinhole, so that no reader takes its pictures for distorted ones."""
+    return {key: value for key, value in intrinsics.items() if key not in LENS_KEYS} | {"camera_model": STRAIGHT[0]}
+
+
 FORMAT = Format(
     name="nerfstudio",
     title="nerfstudio's transforms.json",
@@ -145,7 +152,7 @@ FORMAT = Format(
     read=read,
     write=write,
     own_world=True,
-    models="OPENCV with k1 k2 k3 p1 p2, OPENCV_FISHEYE",
+    models="OPENCV with k1 k2 k3 p1 p2, OPENCV_FISHEYE, PINHOLE",
     says="instant-ngp's too; first pixel's centre at 0.5; camera → world with OpenGL's axes: y and z negated; no unit",
     lacks="skew, two kinds of lens in one file",
 )

@@ -18,6 +18,7 @@ from camviz.scenes import snapshot as photograph
 from camviz.scenes import textured_scene, to_encoded
 from camviz.sensors import Sensor
 from camviz_clinic.calibration import calibrate, calibrate_pair, detect
+from camviz_clinic.calibration.paper import as_printed
 from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.checks.rig import lone_poses
 from camviz_clinic.checks.snapshots import snapshot
@@ -28,6 +29,7 @@ from camviz_clinic.handeye.virtual import cell
 from camviz_clinic.rigs import virtual
 
 BOARD = Board(9, 6, 0.025)
+SHEET = as_printed(Board(10, 7, 0.018, 0.0135, "DICT_5X5_100"), 94.1)  # made for A4 and fitted to Letter
 LEFT = Camera(Intrinsics(640, 480, 530, 531, 322, 238), BrownConrady(-0.2, 0.05))
 RIGHT = Camera(Intrinsics(640, 480, 528, 528, 317, 241), BrownConrady(-0.21, 0.05)).at(
     RigidTransform.from_components([0.1, 0.001, 0], Rotation.from_rotvec([0.002, -0.01, 0.003]))
@@ -64,7 +66,7 @@ cam0:
 
 
 def write(folder: Path) -> None:
-    """left/, right/, later/, knocked/ and rig/ show a board, two files are solved from them, others stand beside."""
+    """left/, right/, later/, knocked/, rig/ and phone/ show a board, two files are solved from them."""
     rng = np.random.default_rng(18)
     together, later = (spread_boards(rng, seen_by, BOARD, VIEWS, (15, 40)) for seen_by in ((LEFT, RIGHT), (KNOCKED,)))
     shoot(folder / "left", LEFT, together, rng)
@@ -81,16 +83,20 @@ def write(folder: Path) -> None:
     cv2.imwrite(str(folder / "around.png"), around[..., ::-1])
     expose(folder / "frames", rng)
     shoot_rig(folder / "rig")
+    own = np.random.default_rng(20)
+    shoot(folder / "phone", LEFT, spread_boards(own, (LEFT,), SHEET, 10, (15, 40)), own, SHEET)
     robot(folder)
     film(folder / "film.avi")
 
 
-def shoot(folder: Path, camera: Camera, cam_from_board: RigidTransform, rng: np.random.Generator) -> None:
+def shoot(
+    folder: Path, camera: Camera, cam_from_board: RigidTransform, rng: np.random.Generator, board: Board = BOARD
+) -> None:
     """Pictures of the board at these poses, 01.png and so on."""
     folder.mkdir(parents=True)
     alone = camera.at(RigidTransform.identity())
     for number, pose in enumerate(cam_from_board, 1):
-        cv2.imwrite(str(folder / f"{number:02}.png"), snapshot(alone, BOARD, pose, rng, NOISE))
+        cv2.imwrite(str(folder / f"{number:02}.png"), snapshot(alone, board, pose, rng, NOISE))
 
 
 def shoot_rig(folder: Path) -> None:
