@@ -107,7 +107,7 @@ def test_anna_and_ben(says):
     assert other == 100 * abs(solved(BEN)[1] / true_f(BEN) - 1)
     says("Anna's corners are sharper, and her boards all parallel.")
     assert ANNA.noise < BEN.noise
-    says("The error bar of fx is fifteen times as long as Ben's.")
+    says("the bar of fx is fifteen times as long as Ben's.")
     assert round(ANNA.experiment.estimates["fx"][1] / BEN.experiment.estimates["fx"][1]) == 15
     formula, scatter = says(
         "For Ben's corners, whose noise is independent, the formula gives ± 2.2 px, and the scatter of his ten views "
@@ -189,7 +189,7 @@ def test_what_the_bullets_of_the_lab_promise(says):
 
 def test_the_rows_read_across(says):
     first, second, far, near = says(
-        "The two smallest errors of the fit, 0.20 and 0.21 px, belong to a camera that is 8.8 px off and to one that "
+        "The two smallest errors of the fit, 0.20 and 0.21 px, belong to a camera that is 8.6 px off and to one that "
         "is 0.23 px off."
     )
     assert first == solved(PARALLEL)[0]
@@ -559,9 +559,9 @@ def test_the_next_best_view(says):
 
 def test_gauge_freedom(says):
     says("there are three turns, three shifts and one scale, seven in all")
-    first, two = says("In lesson 06 the board was known to a tenth of a millimetre.") + says("The noise is 0.2 px:")
-    assert first.value == 6
-    assert two == 0.2
+    says("In lesson 06 the board was known to a tenth of a millimetre.")
+    (noise,) = says("The noise is 0.2 px:")
+    assert noise.value in [0.2]  # as the cell below has it
     from camviz_school.course.material import module
 
     rng = np.random.default_rng(3)
