@@ -224,6 +224,8 @@ def test_poses_absorb_a_moved_principal_point(says):
     )
     assert least == turns.min()
     assert most == turns.max()
+    (again,) = says("A turn of the boards made up for nearly all of those 51 pixels.")
+    assert again.value == pixels.value
     angle, cx, f = says("turn every board by 5.5° about the camera (50 px at f = 522 px)")
     assert angle == np.degrees(np.arctan(cx.value / f.value))
     assert f == true_f(ANNA)
@@ -559,7 +561,9 @@ def test_the_next_best_view(says):
 
 def test_gauge_freedom(says):
     says("there are three turns, three shifts and one scale, seven in all")
-    says("In lesson 06 the board was known to a tenth of a millimetre.")
+    n, m, k = says("Given are R (3, 3) and t (3,) of a camera, and Q, d and s > 0.")[:3]
+    assert n.value == m.value == k.value == 3
+    says("In lesson 06 the board was known.")
     (noise,) = says("The noise is 0.2 px:")
     assert noise.value in [0.2]  # as the cell below has it
     from camviz_school.course.material import module

@@ -762,7 +762,7 @@ def _view_choices(rng: np.random.Generator) -> Iterator[Arguments]:
                 known = _information(rng, k, k + 4)
                 candidates = np.array([_information(rng, k, k + 1) for _ in range(m)])
                 answers = [one(known, candidates, parameter) for one in others]
-                if next_view(known, candidates, parameter) not in answers:
+                if next_view(known, candidates, parameter) not in answers and answers[3] != answers[5]:
                     break
             yield known, candidates, parameter
 
@@ -835,6 +835,12 @@ NEXT.wrong(
 )(most_information)
 NEXT.wrong("This makes the volume of all error bars smallest. The task asks for one parameter.")(by_determinant)
 NEXT.wrong("This is the view after which the variance is *largest*.")(least_of_all)
+NEXT.wrong("The numbers of the candidates begin with 0, as Python counts. Yours begin with 1.")(
+    lambda known, candidates, parameter: next_view(known, candidates, parameter) + 1
+)
+NEXT.wrong("This is the smallest variance. The task asks for the number of the view that leaves it.")(
+    lambda known, candidates, parameter: np.linalg.inv(known + candidates)[:, parameter, parameter].min()
+)
 NEXT.wrong("You add up the variances of all parameters. The task asks for one of them.")(all_variances)
 
 
@@ -999,9 +1005,15 @@ def _gauge_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for turns, shift, factor in ((1, 1, 1), (1, 0, 0), (0, 1, 0), (0, 0, 1)):
         R, Q = (Rotation.from_rotvec(rng.uniform(0.2, 1, 3) * rng.choice([-1, 1], 3)) for _ in range(2))
         Q = Q if turns else Rotation.identity()
-        d, s = shift * rng.uniform(0.5, 2, 3), float(rng.uniform(1.5, 3)) if factor else 1.0
+        d, s = shift * rng.uniform(0.5, 2, 3) * rng.choice([-1, 1], 3), float(rng.uniform(1.5, 3)) if factor else 1.0
         yield R.as_matrix(), rng.uniform(-2, 2, 3), Q.as_matrix(), d, s
-    yield R.as_matrix(), rng.uniform(-2, 2, 3), Rotation.from_rotvec([0.9, -0.4, 0.3]).as_matrix(), d + 1, 0.4
+    yield (
+        R.as_matrix(),
+        rng.uniform(-2, 2, 3),
+        Rotation.from_rotvec([0.9, -0.4, 0.3]).as_matrix(),
+        np.array([-1.0, 0.7, -0.4]),
+        0.4,
+    )
 
 
 GAUGE = Exercise(
