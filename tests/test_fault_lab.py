@@ -198,7 +198,7 @@ def test_the_implied_rotation_is_that_of_the_difference_map():
 
 
 def test_a_reader_s_functions_are_shown_beside_the_right_ones_whatever_they_do():
-    lab = FaultLabView(fault="column off", strength=0.2, seed=5, panels="bars picture")
+    lab = FaultLabView(fault="column off", strength=0.2, seed=5, panels="residuals bars numbers")
     right = lab.but(yours=lesson16.view_rms, verdict=lesson16.triage).figure().svg()
     assert "2, a row or a column is off" in right
     assert "fill-orange" in right
@@ -211,9 +211,21 @@ def test_a_reader_s_functions_are_shown_beside_the_right_ones_whatever_they_do()
 
 
 def test_the_lab_opens_with_the_fit_alone():
-    few = FaultLabView(fault="warped board", panels="bars picture")
+    few = FaultLabView(fault="warped board", panels="residuals bars")
     for later in ("is off by", "What the clinic finds", "less the truth"):
         assert later not in few.figure().svg()
         assert later not in few.description()
-    with pytest.raises(ValueError, match="panels must be one of"):
-        FaultLabView(panels="bars")
+    assert "is off by" in few.but(panels="numbers").description()
+    for wrong in ("bars picture", ""):
+        with pytest.raises(ValueError, match="panels must be one or more of residuals, bars"):
+            few.but(panels=wrong)
+
+
+@pytest.mark.parametrize("panels", ["bars", "estimates findings", "residuals bars numbers estimates findings"])
+def test_panels_stand_where_nothing_else_does(panels):
+    tiles = FaultLabView(fault="blurred view", strength=1.0, panels=panels).figure().tiles
+    assert min(tile.cell[0] for tile in tiles) == min(tile.cell[1] for tile in tiles) == 0
+    for i, (x, y, wide, tall) in enumerate(tile.cell for tile in tiles):
+        for left, top, other_wide, other_tall in (tile.cell for tile in tiles[:i]):
+            apart = x >= left + other_wide or left >= x + wide or y >= top + other_tall or top >= y + tall
+            assert apart

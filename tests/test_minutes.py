@@ -51,6 +51,7 @@ def double(x):
         ([code('explore(view, "k1", k2=(0, 1), together=("k1", "k2"))')], 1 / 8 + 2 * 0.5),
         ([code("explore(view)")], 1 / 8 + 4 * 0.5),
         ([code('ask("05.grid")')], 2),
+        ([code("ward = Ward(16)\nward[1]"), code("ward[2]"), text("ward[3]")], 3 / 8 + 2 * 4 + 1 / 200),  # patients
         ([code('quiz("05", "A")')], 4 * 1),
         ([code('quiz("05")')], 4 * 1.5),
         ([code("def double(x): ...", "stub", camviz={"exercise": "05.double"}), text(SOLUTION, "solution")], 5 + 2),

@@ -49,8 +49,11 @@ MINUTES_A_FIRST_THOUGHT = 1
 MINUTES_AN_EXIT_QUESTION = 1.5
 """For a question of form B: its idea is known by then; the reply is read."""
 
+MINUTES_A_PATIENT = 4
+"""In lesson 16 a calibration is shown by every view of the clinic, and a reader writes down what is wrong with it."""
+
 MINUTES_A_QUESTION = 3
-"""In a lesson that is reckoned as a whole: predictions, exit questions and patients alike."""
+"""In a lesson that is reckoned as a whole: predictions and exit questions alike."""
 
 MINUTES_AN_EXERCISE, MINUTES_A_LINE = 5, 1
 """To understand the task, to try twice and to look at the picture that comes of it; and for each line of the solution
@@ -68,7 +71,7 @@ _WORD = re.compile(r"[^\W\d_]+(?:[’'][^\W\d_]+)?")
 _NOT_READ = re.compile(r"\]\([^)]*\)|\$\$.*?\$\$|\$[^$\n]*\$", re.DOTALL)  # addresses; formulas
 _DISPLAYED = re.compile(r"\$\$.*?\$\$", re.DOTALL)
 _INLINE = re.compile(r"\$[^$\n]+\$")
-_PATIENT = re.compile(r"ward\[\d+\]")
+_PATIENT = re.compile(r"^ward\[\d+\]$", re.MULTILINE)
 _ASKED = re.compile(r'^(ask|quiz)\("(\w\w)(?:\.\w+)?"(?:, "(\w)")?\)$', re.MULTILINE)
 _NOT_GIVEN = {"setup", "colab", "stub", "check"}
 
@@ -134,6 +137,7 @@ def reckoned(cells: Iterable[Cell]) -> float:
         + MINUTES_A_SYMBOL * len(_INLINE.findall(_DISPLAYED.sub(" ", text)))
         + MINUTES_A_CONTROL * sum(len(names) or CONTROLS_OF_ALL for names in controls(cells))
         + MINUTES_AN_EXERCISE * len(stubs(cells))
+        + MINUTES_A_PATIENT * sum(len(_PATIENT.findall(cell.source)) for cell in cells if cell.cell_type == "code")
         + MINUTES_A_LINE * written_lines(cells)
         + sum(_of_questions(*one) for one in asked)
     )
@@ -189,10 +193,9 @@ def whole(notebook: Notebook, number: str) -> int:
         if cell.cell_type == "markdown" and not {"glossary", "solution"} & set(cell.metadata.get("tags", []))
     )
     read = len(_WORD.findall(_NOT_READ.sub(" ", text)))
-    patients = sum(bool(_PATIENT.fullmatch(cell.source)) for cell in notebook.cells)
     first = len(questions.quiz_questions(number, "A"))
     asked = MINUTES_A_FIRST_THOUGHT * first
-    asked += MINUTES_A_QUESTION * (len(questions.questions(number)) - first + patients)
+    asked += MINUTES_A_QUESTION * (len(questions.questions(number)) - first)
     return said(read / WORDS_A_MINUTE + asked + MINUTES_ANY_EXERCISE * len(exercises(number)))
 
 

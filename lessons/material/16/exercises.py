@@ -1,4 +1,4 @@
-"""Lesson 16, the clinic: statistics of residuals, lines of a board, what a rotation explains, and a first diagnosis.
+"""Lesson 16, the clinic: statistics of residuals, a first diagnosis, what the next view tells, and what none can tell.
 
 Residuals are observed less projected, in pixels, (views, corners, 2) or (rows, columns, 2), NaN where nothing was seen.
 """
@@ -150,119 +150,7 @@ def length_of_the_mean(residuals):
     return np.linalg.norm(np.nanmean(residuals, axis=-2), axis=-1)
 
 
-# 2: what is normal? --------------------------------------------------------------------------------------------------
-
-
-def robust_sigma(residuals: Array) -> float:
-    """σ of one coordinate of residuals (..., 2): the median of their lengths over √(2 ln 2) (Rayleigh)."""
-    return float(np.nanmedian(np.linalg.norm(residuals, axis=-1)) / RAYLEIGH)
-
-
-def _sigma_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    yield (_residuals(rng, 60),)
-    for shape in ((8, 54), (3, 6, 9)):
-        wild = _unseen(rng, _residuals(rng, *shape))
-        wild[0] += rng.uniform(5, 30, 2)
-        yield (wild,)
-
-
-ROBUST_SIGMA = Exercise(
-    name="16.robust_sigma",
-    reference=robust_sigma,
-    cases=_sigma_cases,
-    tolerance=1e-3,  # where the number of corners is even, a median of squares is not quite the square of a median
-    hints=(
-        "A median stands in the middle: as long as fewer than half are wild, it does not matter how wild they are.",
-        "For Gaussian noise of σ in each coordinate the median *length* is σ √(2 ln 2) = 1.177 σ. Solve for σ; "
-        "`np.nanmedian` passes over corners that were not seen.",
-        "`return np.nanmedian(___) / np.sqrt(2 * np.log(2))`",
-    ),
-    praise="A view that is thirty pixels off moves your idea of what is normal only a little, and one that is three "
-    "hundred pixels off moves it no more.",
-)
-
-
-@ROBUST_SIGMA.right
-def from_the_seen_ones(residuals):
-    lengths = np.hypot(residuals[..., 0], residuals[..., 1])
-    return np.median(lengths[np.isfinite(lengths)]) / np.sqrt(np.log(4))
-
-
-@ROBUST_SIGMA.right
-def from_squares(residuals):
-    return np.sqrt(np.nanquantile(np.sum(residuals**2, axis=-1), 0.5) / (2 * np.log(2)))
-
-
-@ROBUST_SIGMA.right
-def by_sorting(residuals):
-    lengths = np.sort(np.sqrt(np.nansum(residuals**2, axis=-1))[~np.isnan(residuals).any(axis=-1)])
-    middle = len(lengths) // 2
-    median = lengths[middle] if len(lengths) % 2 else (lengths[middle - 1] + lengths[middle]) / 2
-    return median / 1.17741
-
-
-@ROBUST_SIGMA.right
-def by_scipy_s_rayleigh(residuals):
-    from scipy.stats import rayleigh
-
-    return np.nanpercentile(np.abs(residuals[..., 0] + 1j * residuals[..., 1]), 50) / rayleigh.median()
-
-
-@ROBUST_SIGMA.wrong("This is the ordinary standard deviation: the wild view, which you want to find, has moved it.")
-def standard_deviation(residuals):
-    return np.nanstd(residuals)
-
-
-@ROBUST_SIGMA.wrong("This is the median length. It is 1.177 σ, not σ: divide by √(2 ln 2).")
-def median_of_lengths(residuals):
-    return np.nanmedian(np.linalg.norm(residuals, axis=-1))
-
-
-@ROBUST_SIGMA.wrong("A good robust σ, of single *coordinates*. Here it is asked from the median of the lengths.")
-def of_coordinates(residuals):
-    return 1.4826 * np.nanmedian(np.abs(residuals))
-
-
-@ROBUST_SIGMA.wrong(
-    "The factor 1.4826 belongs to the absolute value of one number. A length in the plane has √(2 ln 2)."
-)
-def factor_of_one_number(residuals):
-    return 1.4826 * np.nanmedian(np.linalg.norm(residuals, axis=-1))
-
-
-@ROBUST_SIGMA.wrong(
-    "It is right where every corner was seen; elsewhere NaN gets into the median. There is `np.nanmedian`."
-)
-def nan_in_the_median(residuals):
-    return np.median(np.linalg.norm(residuals, axis=-1)) / RAYLEIGH
-
-
-@ROBUST_SIGMA.wrong("You multiply by √(2 ln 2). The median length is *longer* than σ by that factor: divide.")
-def multiplied(residuals):
-    return np.nanmedian(np.linalg.norm(residuals, axis=-1)) * RAYLEIGH
-
-
-@ROBUST_SIGMA.wrong("The factor is the *root* of 2 ln 2. You divide by 2 ln 2 itself.")
-def root_forgotten(residuals):
-    return np.nanmedian(np.linalg.norm(residuals, axis=-1)) / (2 * np.log(2))
-
-
-@ROBUST_SIGMA.wrong("Two coordinates make √2 for an RMS. A median length is longer than σ by √(2 ln 2).")
-def divided_by_root_two(residuals):
-    return np.nanmedian(np.linalg.norm(residuals, axis=-1)) / np.sqrt(2)
-
-
-@ROBUST_SIGMA.wrong("This begins with the *mean* length, and one wild view moves a mean as far as it likes.")
-def from_the_mean_length(residuals):
-    return np.nanmean(np.linalg.norm(residuals, axis=-1)) / np.sqrt(np.pi / 2)
-
-
-@ROBUST_SIGMA.wrong("You use the logarithm to base ten. The formula has the natural one, ln, which is `np.log`.")
-def common_logarithm(residuals):
-    return np.nanmedian(np.linalg.norm(residuals, axis=-1)) / np.sqrt(2 * np.log10(2))
-
-
-# 3: find the bug -----------------------------------------------------------------------------------------------------
+# 2: find the bug -----------------------------------------------------------------------------------------------------
 
 
 def line_lengths(residuals: Array, rows: int, columns: int) -> tuple[Array, Array]:
@@ -383,7 +271,211 @@ def coordinates_added(residuals, rows, columns):
     return np.median(lengths, axis=1), np.median(lengths, axis=0)
 
 
-# 4: triage -----------------------------------------------------------------------------------------------------------
+# 3: what is normal? --------------------------------------------------------------------------------------------------
+
+
+def robust_sigma(residuals: Array) -> float:
+    """σ of one coordinate of residuals (..., 2): the median of their lengths over √(2 ln 2) (Rayleigh)."""
+    return float(np.nanmedian(np.linalg.norm(residuals, axis=-1)) / RAYLEIGH)
+
+
+def _sigma_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    yield (_residuals(rng, 60),)
+    for shape in ((8, 54), (3, 6, 9)):
+        wild = _unseen(rng, _residuals(rng, *shape))
+        wild[0] += rng.uniform(5, 30, 2)
+        yield (wild,)
+
+
+ROBUST_SIGMA = Exercise(
+    name="16.robust_sigma",
+    reference=robust_sigma,
+    cases=_sigma_cases,
+    tolerance=1e-3,  # where the number of corners is even, a median of squares is not quite the square of a median
+    hints=(
+        "A median stands in the middle: as long as fewer than half are wild, it does not matter how wild they are.",
+        "For Gaussian noise of σ in each coordinate the median *length* is σ √(2 ln 2) = 1.177 σ. Solve for σ; "
+        "`np.nanmedian` passes over corners that were not seen.",
+        "`return np.nanmedian(___) / np.sqrt(2 * np.log(2))`",
+    ),
+    praise="A view that is thirty pixels off moves your idea of what is normal only a little, and one that is three "
+    "hundred pixels off moves it no more.",
+)
+
+
+@ROBUST_SIGMA.right
+def from_the_seen_ones(residuals):
+    lengths = np.hypot(residuals[..., 0], residuals[..., 1])
+    return np.median(lengths[np.isfinite(lengths)]) / np.sqrt(np.log(4))
+
+
+@ROBUST_SIGMA.right
+def from_squares(residuals):
+    return np.sqrt(np.nanquantile(np.sum(residuals**2, axis=-1), 0.5) / (2 * np.log(2)))
+
+
+@ROBUST_SIGMA.right
+def by_sorting(residuals):
+    lengths = np.sort(np.sqrt(np.nansum(residuals**2, axis=-1))[~np.isnan(residuals).any(axis=-1)])
+    middle = len(lengths) // 2
+    median = lengths[middle] if len(lengths) % 2 else (lengths[middle - 1] + lengths[middle]) / 2
+    return median / 1.17741
+
+
+@ROBUST_SIGMA.right
+def by_scipy_s_rayleigh(residuals):
+    from scipy.stats import rayleigh
+
+    return np.nanpercentile(np.abs(residuals[..., 0] + 1j * residuals[..., 1]), 50) / rayleigh.median()
+
+
+@ROBUST_SIGMA.wrong("This is the ordinary standard deviation: the wild view, which you want to find, has moved it.")
+def standard_deviation(residuals):
+    return np.nanstd(residuals)
+
+
+@ROBUST_SIGMA.wrong("This is the median length. It is 1.177 σ, not σ: divide by √(2 ln 2).")
+def median_of_lengths(residuals):
+    return np.nanmedian(np.linalg.norm(residuals, axis=-1))
+
+
+@ROBUST_SIGMA.wrong("A good robust σ, of single *coordinates*. Here it is asked from the median of the lengths.")
+def of_coordinates(residuals):
+    return 1.4826 * np.nanmedian(np.abs(residuals))
+
+
+@ROBUST_SIGMA.wrong(
+    "The factor 1.4826 belongs to the absolute value of one number. A length in the plane has √(2 ln 2)."
+)
+def factor_of_one_number(residuals):
+    return 1.4826 * np.nanmedian(np.linalg.norm(residuals, axis=-1))
+
+
+@ROBUST_SIGMA.wrong(
+    "It is right where every corner was seen; elsewhere NaN gets into the median. There is `np.nanmedian`."
+)
+def nan_in_the_median(residuals):
+    return np.median(np.linalg.norm(residuals, axis=-1)) / RAYLEIGH
+
+
+@ROBUST_SIGMA.wrong("You multiply by √(2 ln 2). The median length is *longer* than σ by that factor: divide.")
+def multiplied(residuals):
+    return np.nanmedian(np.linalg.norm(residuals, axis=-1)) * RAYLEIGH
+
+
+@ROBUST_SIGMA.wrong("The factor is the *root* of 2 ln 2. You divide by 2 ln 2 itself.")
+def root_forgotten(residuals):
+    return np.nanmedian(np.linalg.norm(residuals, axis=-1)) / (2 * np.log(2))
+
+
+@ROBUST_SIGMA.wrong("Two coordinates make √2 for an RMS. A median length is longer than σ by √(2 ln 2).")
+def divided_by_root_two(residuals):
+    return np.nanmedian(np.linalg.norm(residuals, axis=-1)) / np.sqrt(2)
+
+
+@ROBUST_SIGMA.wrong("This begins with the *mean* length, and one wild view moves a mean as far as it likes.")
+def from_the_mean_length(residuals):
+    return np.nanmean(np.linalg.norm(residuals, axis=-1)) / np.sqrt(np.pi / 2)
+
+
+@ROBUST_SIGMA.wrong("You use the logarithm to base ten. The formula has the natural one, ln, which is `np.log`.")
+def common_logarithm(residuals):
+    return np.nanmedian(np.linalg.norm(residuals, axis=-1)) / np.sqrt(2 * np.log10(2))
+
+
+# 4: Huber's weight ---------------------------------------------------------------------------------------------------
+
+
+def huber_weight(lengths: Array, limit: float) -> Array:
+    """The weights (...) of residuals of these lengths (...): 1 up to the limit, limit / length beyond (Huber 1964)."""
+    return limit / np.maximum(lengths, limit)
+
+
+def _huber_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    limit = float(rng.uniform(0.2, 0.9))
+    yield limit * np.array([0, 0.5, 1 - 1e-3, 1, 1 + 1e-3, 2, 30]), limit
+    yield rng.uniform(0, 4, 20), float(rng.uniform(1.2, 2.5))
+    yield rng.uniform(0, 6, (3, 9)) * rng.integers(0, 2, (3, 9)), float(rng.uniform(1.5, 2.5))
+
+
+HUBER = Exercise(
+    name="16.huber_weight",
+    reference=huber_weight,
+    cases=_huber_cases,
+    hints=(
+        "What is the weight of a corner that is just at the limit, by either line of the formula?",
+        "`np.where` chooses between the two lines, but computes both: see that nothing is divided by 0. Or find one "
+        "expression that is 1 up to the limit by itself.",
+        "`return limit / np.maximum(___, ___)`",
+    ),
+    praise="Beyond the limit every corner pulls with the same force, one that is far off no more than another.",
+)
+
+
+@HUBER.right
+def corner_by_corner_in_a_loop(lengths, limit):
+    weights = np.ones_like(lengths)
+    for i, length in np.ndenumerate(lengths):
+        if length > limit:
+            weights[i] = limit / length
+    return weights
+
+
+@HUBER.right
+def by_a_mask(lengths, limit):
+    weights, far = np.ones(np.shape(lengths)), lengths > limit
+    weights[far] = limit / lengths[far]
+    return weights
+
+
+@HUBER.right
+def the_smaller_of_two(lengths, limit):
+    with np.errstate(divide="ignore"):
+        return np.minimum(1, limit / lengths)
+
+
+@HUBER.wrong("It is right but for a length of 0, where it answers inf or NaN: a corner without any error weighs 1.")
+def without_the_first_line(lengths, limit):
+    with np.errstate(divide="ignore"):
+        return np.where(lengths == 0, np.inf, np.minimum(1, limit / np.maximum(lengths, 1e-300)))
+
+
+@HUBER.wrong("A corner within the limit weighs more than 1 in yours. There it is least squares: the weight is 1.")
+def heavier_when_near(lengths, limit):
+    return limit / np.maximum(lengths, 1e-9)
+
+
+@HUBER.wrong("Corners beyond the limit have no weight in yours. That is another loss: Huber's lets them pull a little.")
+def cut_off(lengths, limit):
+    return np.where(lengths <= limit, 1.0, 0.0)
+
+
+@HUBER.wrong("This is the force, weight times length. The weight is what a square is multiplied by.")
+def the_force(lengths, limit):
+    return np.minimum(lengths, limit)
+
+
+@HUBER.wrong("The fraction stands on its head: a corner that is farther off weighs more in yours.")
+def upside_down(lengths, limit):
+    return np.maximum(lengths, limit) / limit
+
+
+@HUBER.wrong("Beyond the limit this falls with the square of the length. Huber's weight falls with the length itself.")
+def squared(lengths, limit):
+    return (limit / np.maximum(lengths, limit)) ** 2
+
+
+@HUBER.wrong("These are Cauchy's weights, which begin to fall at once. Huber's are 1 up to the limit.")
+def of_cauchy(lengths, limit):
+    return 1 / (1 + (lengths / limit) ** 2)
+
+
+@HUBER.wrong("This is the loss. The weight is the force that its slope gives, divided by the length.")
+def the_loss(lengths, limit):
+    return np.where(lengths <= limit, lengths**2, 2 * limit * lengths - limit**2)
+
+
+# 5: triage -----------------------------------------------------------------------------------------------------------
 
 
 def triage(residuals: Array) -> int:
@@ -647,7 +739,112 @@ def each_view_by_itself(residuals):
     return max(_triage(view[None]) for view in residuals)
 
 
-# 5: what a turn explains ---------------------------------------------------------------------------------------------
+# 6: the next best view ------------------------------------------------------------------------------------------------
+
+
+def next_view(known: Array, candidates: Array, parameter: int) -> int:
+    """The number of the candidate (m, k, k) that leaves the smallest variance of a parameter, beside `known` (k, k)."""
+    return int(np.argmin(np.linalg.inv(known + candidates)[:, parameter, parameter]))
+
+
+def _information(rng: np.random.Generator, k: int, rows: int) -> Array:
+    J = rng.normal(0, 1, (rows, k)) * 10 ** rng.uniform(-0.5, 0.5, k)
+    J[:, 1] += 2 * J[:, 0]  # parameters that trade with each other
+    return J.T @ J
+
+
+def _view_choices(rng: np.random.Generator) -> Iterator[Arguments]:
+    """Among which the usual mistakes choose another view: it is the best of none of them but by chance."""
+    others = (without_the_known, trace_for_one, most_information, by_determinant, least_of_all, all_variances)
+    for k, m in ((3, 5), (4, 6), (6, 9)):
+        for parameter in (0, 1, k - 1):
+            for _ in range(40):
+                known = _information(rng, k, k + 4)
+                candidates = np.array([_information(rng, k, k + 1) for _ in range(m)])
+                answers = [one(known, candidates, parameter) for one in others]
+                if next_view(known, candidates, parameter) not in answers and answers[3] != answers[5]:
+                    break
+            yield known, candidates, parameter
+
+
+def without_the_known(known, candidates, parameter):
+    return np.argmin(np.linalg.inv(candidates)[:, parameter, parameter])
+
+
+def trace_for_one(known, candidates, parameter):
+    return np.argmax([np.trace(one) for one in candidates])
+
+
+def most_information(known, candidates, parameter):
+    return np.argmax(candidates[:, parameter, parameter])
+
+
+def by_determinant(known, candidates, parameter):
+    return np.argmax(np.linalg.det(known + candidates))
+
+
+def least_of_all(known, candidates, parameter):
+    return np.argmax(np.linalg.inv(known + candidates)[:, parameter, parameter])
+
+
+def all_variances(known, candidates, parameter):
+    return np.argmin([np.trace(np.linalg.inv(known + one)) for one in candidates])
+
+
+NEXT = Exercise(
+    name="16.next_view",
+    reference=next_view,
+    cases=_view_choices,
+    hints=(
+        "Information adds up: with the first candidate there is `known + candidates[0]`.",
+        "Invert each sum, and look at one number on the diagonal of each inverse. `np.linalg.inv` takes a stack of "
+        "matrices (m, k, k), too.",
+        "`return np.argmin(np.linalg.inv(___)[:, parameter, parameter])`",
+    ),
+    praise="A picture can be judged before it is taken: its information needs a pose, and no corners.",
+)
+
+
+@NEXT.right
+def one_after_the_other(known, candidates, parameter):
+    variances = [np.linalg.inv(known + one)[parameter, parameter] for one in candidates]
+    return variances.index(min(variances))
+
+
+@NEXT.right
+def by_solving(known, candidates, parameter):
+    wanted = np.eye(len(known))[parameter]
+    return min(range(len(candidates)), key=lambda i: wanted @ np.linalg.solve(known + candidates[i], wanted))
+
+
+@NEXT.right
+def by_cholesky(known, candidates, parameter):
+    roots = np.linalg.inv(np.linalg.cholesky(known + candidates))
+    return np.argmin(np.sum(roots[:, :, parameter] ** 2, axis=1))
+
+
+NEXT.wrong("You judge the candidates by themselves. Add to each what is known already, and then invert.")(
+    without_the_known
+)
+NEXT.wrong("You choose the view with the most information of all. Ask for the variance of the one parameter.")(
+    trace_for_one
+)
+NEXT.wrong(
+    "You read the diagonal of the information. Its inverse would be the variance if all other parameters were known; "
+    "invert the whole matrix first."
+)(most_information)
+NEXT.wrong("This makes the volume of all error bars smallest. The task asks for one parameter.")(by_determinant)
+NEXT.wrong("This is the view after which the variance is *largest*.")(least_of_all)
+NEXT.wrong("The numbers of the candidates begin with 0, as Python counts. Yours begin with 1.")(
+    lambda known, candidates, parameter: next_view(known, candidates, parameter) + 1
+)
+NEXT.wrong("This is the smallest variance. The task asks for the number of the view that leaves it.")(
+    lambda known, candidates, parameter: np.linalg.inv(known + candidates)[:, parameter, parameter].min()
+)
+NEXT.wrong("You add up the variances of all parameters. The task asks for one of them.")(all_variances)
+
+
+# 7: what a turn explains ---------------------------------------------------------------------------------------------
 
 
 def implied_rotation(rays_first: Array, rays_second: Array) -> Array:
@@ -796,4 +993,110 @@ def stretch_kept(rays_first, rays_second):
     return rays_second.T @ rays_first / len(rays_first)
 
 
-EXERCISES = (VIEW_RMS, ROBUST_SIGMA, LINES, TRIAGE, ROTATION)
+# 8: other numbers, the same pictures ----------------------------------------------------------------------------------
+
+
+def same_pictures(R: Array, t: Array, Q: Array, d: Array, s: float) -> tuple[Array, Array]:
+    """The pose (R, t) that sees s Q X + d in the pixel where the given pose sees X, s times as far away."""
+    return R @ Q.T, s * t - R @ Q.T @ d
+
+
+def _gauge_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    for turns, shift, factor in ((1, 1, 1), (1, 0, 0), (0, 1, 0), (0, 0, 1)):
+        R, Q = (Rotation.from_rotvec(rng.uniform(0.2, 1, 3) * rng.choice([-1, 1], 3)) for _ in range(2))
+        Q = Q if turns else Rotation.identity()
+        d, s = shift * rng.uniform(0.5, 2, 3) * rng.choice([-1, 1], 3), float(rng.uniform(1.5, 3)) if factor else 1.0
+        yield R.as_matrix(), rng.uniform(-2, 2, 3), Q.as_matrix(), d, s
+    yield (
+        R.as_matrix(),
+        rng.uniform(-2, 2, 3),
+        Rotation.from_rotvec([0.9, -0.4, 0.3]).as_matrix(),
+        np.array([-1.0, 0.7, -0.4]),
+        0.4,
+    )
+
+
+GAUGE = Exercise(
+    name="16.same_pictures",
+    reference=same_pictures,
+    cases=_gauge_cases,
+    hints=(
+        "Solve X′ = s Q X + d for X. The inverse of a rotation is its transpose.",
+        "Put that X into R X + t, and multiply by s: a pixel does not tell how far away a point is. What stands before "
+        "X′, and what stands alone?",
+        "`return R @ Q.T, s * t - ___`",
+    ),
+    praise="No picture tells the two worlds apart. Whoever wants numbers has to fix seven of them.",
+)
+
+
+@GAUGE.right
+def by_the_camera_s_centre(R, t, Q, d, s):
+    centre = s * Q @ (-R.T @ t) + d
+    turned = R @ Q.T
+    return turned, -turned @ centre
+
+
+@GAUGE.right
+def by_matrices_of_four(R, t, Q, d, s):
+    def four(A, b):
+        whole = np.eye(4)
+        whole[:3, :3], whole[:3, 3] = A, b
+        return whole
+
+    made = four(s * np.eye(3), np.zeros(3)) @ four(R, t) @ np.linalg.inv(four(s * Q, d))
+    return [made[:3, :3], made[:3, 3]]
+
+
+@GAUGE.right
+def with_scipy(R, t, Q, d, s):
+    turned = Rotation.from_matrix(R) * Rotation.from_matrix(Q).inv()
+    return turned.as_matrix(), s * t - turned.apply(d)
+
+
+@GAUGE.wrong("The world is turned, so the camera has to undo it: Qᵀ stands behind R, not Q.")
+def q_for_its_transpose(R, t, Q, d, s):
+    return R @ Q, s * t - R @ Q @ d
+
+
+@GAUGE.wrong("Qᵀ stands on the wrong side of R: first a point is taken out of the changed world, and then R turns it.")
+def on_the_other_side(R, t, Q, d, s):
+    return Q.T @ R, s * t - Q.T @ R @ d
+
+
+@GAUGE.wrong("The shift d is given in the changed world. Your new rotation has to turn it before it is subtracted.")
+def shift_not_turned(R, t, Q, d, s):
+    return R @ Q.T, s * t - d
+
+
+@GAUGE.wrong("The sign of the shift is wrong: what the world was moved by has to be taken away.")
+def shift_added(R, t, Q, d, s):
+    return R @ Q.T, s * t + R @ Q.T @ d
+
+
+@GAUGE.wrong("A world that is s times as large is s times as far away: t has to grow with it.")
+def scale_forgotten(R, t, Q, d, s):
+    return R @ Q.T, t - R @ Q.T @ d
+
+
+@GAUGE.wrong("You multiply the shift d by s as well. The world is made larger first, and moved then.")
+def shift_scaled(R, t, Q, d, s):
+    return R @ Q.T, s * (t - R @ Q.T @ d)
+
+
+@GAUGE.wrong("The scale went into the rotation, which is none any more. It belongs to t.")
+def scale_in_the_rotation(R, t, Q, d, s):
+    return R @ Q.T / s, t - R @ Q.T @ d / s
+
+
+@GAUGE.wrong("This moves the camera's t as if it were a point of the world. t is −R times the camera's centre.")
+def t_as_a_point(R, t, Q, d, s):
+    return R @ Q.T, s * Q @ t + d
+
+
+@GAUGE.wrong("This is the pose as it was. In the changed world it takes another picture.")
+def unchanged(R, t, Q, d, s):
+    return R, t
+
+
+EXERCISES = (VIEW_RMS, LINES, ROBUST_SIGMA, HUBER, TRIAGE, NEXT, ROTATION, GAUGE)

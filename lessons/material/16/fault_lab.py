@@ -5,7 +5,7 @@ A reader's own functions can measure every view and name what is off, beside the
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar, Self
@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from camviz.draw import plot, svg
-from camviz.draw.flow import rows
+from camviz.draw.flow import Cell, rows
 from camviz.draw.panel import Panel, image_in
 from camviz.draw.picture import Picture
 from camviz.draw.readout import listed, true_minus
@@ -28,10 +28,9 @@ _COLOURS = {"fault": "red", "warning": "orange", "note": "muted"}
 _MOST = 3  # findings that have room
 _FAR = 4.0  # standard deviations
 _LONGEST = 90.0  # picture units of an arrow
-_EVERYTHING = "bars picture estimates findings"
-_ERRORS = (366, {"residuals": 440, "bars": 300, "numbers": 220})
-_LAYOUTS = {"bars picture": rows(_ERRORS), _EVERYTHING: rows(_ERRORS, (272, {"estimates": 340}))}
-_FINDINGS = (340, 620)  # where they begin, and how wide they are together
+_ROWS = (366, {"residuals": 440, "bars": 300, "numbers": 220}), (272, {"estimates": 340, "findings": 620})
+_WIDE = {name: wide for _, row in _ROWS for name, wide in row.items()}
+"""The panels in their order, and how wide each is in picture units; the height of each row stands before it."""
 _VERDICTS = ("0, nothing is off", "1, a corner is off", "2, a row or a column is off", "3, a whole view is off")
 
 
@@ -43,13 +42,13 @@ class FaultLabView(ViewChooser):
     boards and noise. Arrows lead from a detected corner of the chosen view to its projection. A click on a bar
     chooses its view.
 
-    `panels` says what is drawn: everything, or "bars picture", the errors of the fit alone. `yours` is a reader's
+    `panels` names what is drawn: any of residuals, bars, numbers, estimates and findings. `yours` is a reader's
     function of residuals (views, corners, 2) to the RMS (views,) of every view, and `verdict` one of residuals (views,
     rows, columns, 2) to 0 … 3, for nothing, a corner, a line or a whole view; what they answer is orange.
     """
 
     title: ClassVar[str] = "Fault lab"
-    layouts = _LAYOUTS
+    openable: ClassVar[Mapping[str, str]] = {name: name for name in _WIDE}
 
     fault: str = choice(*lab_faults(), help="what is wrong")
     strength: float = slider(0.5, 0, 1, 0.01, help="0 is healthy, 1 is gross")
@@ -58,9 +57,14 @@ class FaultLabView(ViewChooser):
     view: int = slider(1, 1, VIEWS, 1, label="view", help="whose residuals are shown; or click its bar")
     told: bool = switch(True, label="show the findings", help="hide them to make a diagnosis of your own")
 
-    panels: str = _EVERYTHING
+    panels: str = " ".join(_WIDE)
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
     verdict: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not (wanted := self.panels.split()) or not {*wanted} <= {*_WIDE}:
+            raise ValueError(f"panels must be one or more of {', '.join(_WIDE)}, got {self.panels!r}")
 
     @cached_property
     def experiment(self) -> Experiment:
@@ -85,16 +89,14 @@ class FaultLabView(ViewChooser):
         }
 
     def description(self) -> str:
-        cause = f"{self.fault}, strength {self.strength:g}: {self.experiment.words}; " if self.told else ""
-        if self.panels != _EVERYTHING:
-            return f"{cause}error of the fit {self.numbers()['error of the fit']}."
-        told = self._diagnosis() if self.told else "Findings hidden."
-        numbers = listed(self.numbers())
-        estimates = "; ".join(
-            f"{k} {'+' if e > 0 else '−'}{figures(abs(e))} ± {figures(s)} px"
-            for k, (e, s) in self.experiment.estimates.items()
-        )
-        return f"{cause}{numbers}. Estimated less true: {estimates}. {told}"
+        told = [f"{self.fault}, strength {self.strength:g}: {self.experiment.words}"] if self.told else []
+        told += [listed(dict([*self.numbers().items()][: 3 if self._has("numbers") else 1]))]
+        if self._has("estimates"):
+            estimates = (f"{k} {_signed(e, s)} px" for k, (e, s) in self.experiment.estimates.items())
+            told += [f"estimated less true: {'; '.join(estimates)}"]
+        if self._has("findings"):
+            told += [self._diagnosis() if self.told else "findings hidden"]
+        return "; ".join(told).rstrip(".") + "."
 
     def _diagnosis(self) -> str:
         findings = self.experiment.inspection.findings
@@ -103,32 +105,41 @@ class FaultLabView(ViewChooser):
     # The picture -----------------------------------------------------------------------------------------------------
 
     def figure(self, *, draft: bool = False) -> Picture:
-        layout = _LAYOUTS[self.panels]
-        parts = {"residuals": self._image_panel(), "bars": self._bars_panel(), "numbers": self._headline()}
-        if self.panels == _EVERYTHING:
-            findings = self._findings(draft)
-            tiles = {f"finding {i + 1}": body for i, body in enumerate(findings)}
-            parts |= {"estimates": self._estimates_panel()} | tiles
-            layout = rows(
-                _ERRORS, (272, {"estimates": _FINDINGS[0], **dict.fromkeys(tiles, _FINDINGS[1] / len(tiles))})
-            )
+        draw = self._image_panel, self._bars_panel, self._headline, self._estimates_panel
+        parts = {name: panel() for name, panel in zip(_WIDE, draw, strict=False) if self._has(name)}
+        layout, tiles = self._layout, self._findings(draft) if self._has("findings") else []
+        for i, body in enumerate(tiles):
+            x, y, wide, tall = layout["findings"]
+            parts[f"finding {i + 1}"] = body
+            layout[f"finding {i + 1}"] = (x + wide / len(tiles) * i, y, wide / len(tiles), tall)
         words = f"{self.fault}, strength {self.strength:g}" if draft else self.description()
         return self.tiled(layout, parts, described=words)
+
+    @property
+    def _layout(self) -> dict[str, Cell]:
+        shown = [(tall, {name: wide for name, wide in row.items() if self._has(name)}) for tall, row in _ROWS]
+        return rows(*(line for line in shown if line[1]))
+
+    def _corner(self, tile: str, right: float, down: float) -> tuple[float, float]:
+        """A place in a tile, from its upper left corner."""
+        x, y, *_ = self._layout[tile]
+        return x + right, y + down
 
     def _headline(self) -> str:
         told = {"error of the fit": "RMS of all residuals", "believes to be off by": "1σ, by its covariance",
                 "is off by": "against the true camera"}  # fmt: skip
         parts = []
-        shown = 3 if self.panels == _EVERYTHING else 1
+        shown = 3 if self.verdict is None else 1
         for i, (name, value) in enumerate(list(self.numbers().items())[:shown]):
-            y = 26 + 72 * i
-            parts.append(svg.text((750, y), name, "title"))
-            parts.append(svg.text((750, y + 29), value, f"label{' red' if i == 2 and self._astray else ''}",
+            x, y = self._corner("numbers", 10, 26 + 72 * i)
+            parts.append(svg.text((x, y), name, "title"))
+            parts.append(svg.text((x, y + 29), value, f"label{' red' if i == 2 and self._astray else ''}",
                                   style="font-size:26px;font-weight:600"))  # fmt: skip
-            parts.append(svg.text((750, y + 48), told[name], "note"))
+            parts.append(svg.text((x, y + 48), told[name], "note"))
         words = f"In this calibration, {self.experiment.words}." if self.strength else "A healthy calibration."
         words = words if self.told else "What is wrong here?"
-        return "".join(parts) + svg.paragraph((750, 32 + 72 * shown), words, 200, "label") + self._your_verdict()
+        place = self._corner("numbers", 10, 32 + 72 * shown)
+        return "".join(parts) + svg.paragraph(place, words, 200, "label") + self._your_verdict()
 
     def _your_verdict(self) -> str:
         """What the reader's triage says of all residuals together."""
@@ -136,11 +147,12 @@ class FaultLabView(ViewChooser):
             return ""
         residuals = self.experiment.residuals.reshape(VIEWS, BOARD.rows, BOARD.columns, 2)
         answer, problem = tried(self.verdict, (residuals,), 0.0)
+        x, y = self._corner("numbers", 10, 322)
         if problem:
-            return svg.paragraph((750, 322), problem, 200)
+            return svg.paragraph((x, y), problem, 200)
         known = answer in range(len(_VERDICTS))
         words = _VERDICTS[int(answer)] if known else f"{answer:g}, which is none of 0 to {len(_VERDICTS) - 1}"
-        return svg.text((750, 322), "Your verdict", "title") + svg.paragraph((750, 342), words, 200, "orange")
+        return svg.text((x, y), "Your verdict", "title") + svg.paragraph((x, y + 20), words, 200, "orange")
 
     @property
     def _astray(self) -> bool:
@@ -150,7 +162,7 @@ class FaultLabView(ViewChooser):
     @property
     def _bars(self) -> Panel:
         tallest = 1.15 * max(float(np.nanmax(self.experiment.errors)), 3 * self.noise)
-        return plot.plot_panel("bars", 498, 34, 232, 288, (0.5, VIEWS + 0.5), (0, tallest))
+        return plot.plot_panel("bars", *self._corner("bars", 58, 34), 232, 288, (0.5, VIEWS + 0.5), (0, tallest))
 
     def _bars_panel(self) -> str:
         panel, errors = self._bars, self.experiment.errors
@@ -179,7 +191,7 @@ class FaultLabView(ViewChooser):
     def _image_panel(self) -> str:
         made, i = self.experiment, self.index
         k = made.camera.intrinsics
-        panel = image_in(_LAYOUTS[self.panels]["residuals"], "picture", k.width, k.height)
+        panel = image_in(self._layout["residuals"], "picture", k.width, k.height)
         seen, residuals, scale = made.solved.detections["camera"][i], made.residuals[i], self.arrow_scale
         starts = panel.place(seen)
         ends, cut = shortened(starts, panel.place(seen - scale * residuals), _LONGEST)
@@ -199,7 +211,8 @@ class FaultLabView(ViewChooser):
         estimates = self.experiment.estimates
         values = np.array(list(estimates.values()))
         reach = 1.15 * max(float(np.max(np.abs(values[:, 0]) + values[:, 1])), 3.0)
-        panel = Panel("estimates", 46, 400, 150, 26.0 * len(estimates) + 6, -reach, reach, 0, len(estimates) + 0.2)
+        x, top = self._corner("estimates", 46, 34)
+        panel = Panel("estimates", x, top, 150, 26.0 * len(estimates) + 6, -reach, reach, 0, len(estimates) + 0.2)
         content = svg.line(panel.place([(0, 0), (0, panel.bottom)]), "ink")
         beside = ""
         for i, (name, (error, sigma)) in enumerate(estimates.items()):
@@ -218,12 +231,12 @@ class FaultLabView(ViewChooser):
             for px, (_, words) in zip(panel.place([(t, 0) for t, _ in ticks])[:, 0], ticks, strict=True)
         )
         note = "In pixels; k1 and k2 at the corner. Red: more than 4σ off."
-        return shown + beside + below + svg.paragraph((10, panel.y + panel.height + 38), note, 310)
+        return shown + beside + below + svg.paragraph((x - 36, panel.y + panel.height + 38), note, 310)
 
     def _findings(self, draft: bool) -> list[str]:
         """What the clinic finds, a tile for each, the worst first."""
-        (left, whole), y = _FINDINGS, _ERRORS[0] + 26
-        x, room = left + 10, whole - 20
+        (x, y), whole = self._corner("findings", 10, 26), _WIDE["findings"]
+        room = whole - 20
         head = svg.text((x, y), "What the clinic finds", "title")
         if not self.told:
             return [
@@ -247,7 +260,7 @@ class FaultLabView(ViewChooser):
     def _finding(self, x: float, y: float, width: float, finding: Finding, count: int) -> str:
         times, colour = f" × {count}" if count > 1 else "", _COLOURS[finding.severity]
         return (
-            svg.rectangle(x, y - 14, 4, 60 + 154 * _FINDINGS[1] / width / _MOST, f"fill-{colour}")
+            svg.rectangle(x, y - 14, 4, 60 + 154 * _WIDE["findings"] / width / _MOST, f"fill-{colour}")
             + svg.text((x + 12, y), f"{finding.id}{times}", f"title {colour}")
             + svg.paragraph((x + 12, y + 30), f"{finding.severity}: {_short(finding.sentence)}", width - 28, "label")
         )
