@@ -27,7 +27,11 @@ EVEN = 0.25  # of the usual time between two frames: what a clock may be off by 
 
 
 class FilmError(ValueError):
-    """A film that cannot be read; `why` in words without its name, the message with it.
+    """A film that cannot be read.
+
+    Args:
+        path: The film.
+        why: In words without its name; the message is with it.
 
     >>> Film("none.mp4")
     Traceback (most recent call last):
@@ -46,7 +50,7 @@ class Frame:
     Args:
         number: How many frames come before it.
         time_s: From the first frame on, in seconds, as the film tells it.
-        gray: (height, width) of uint8.
+        gray: (height, width) of uint8, grey levels.
 
     >>> Frame(0, 0.0, np.zeros((480, 640), np.uint8)).number
     0
@@ -83,6 +87,13 @@ class Film:
     160 120 18 []
     """
 
+    width: int
+    height: int
+    rate: float
+    count: int
+    turned_deg: int
+    notes: list[str]
+
     def __init__(self, path: str | PathLike[str], label: str = "") -> None:
         self.path = Path(path)
         self.label = label or self.path.stem
@@ -103,7 +114,7 @@ class Film:
         self.rate = rate if 0 < rate < 1e5 else 30.0
         self.count = int(count) if 0 < count < 1e8 else 0
         self.turned_deg = int(told(cv2.CAP_PROP_ORIENTATION_META)) % 360
-        self.notes: list[str] = []
+        self.notes = []
         self._cut = False
         self._began = 0.0
 
@@ -116,7 +127,7 @@ class Film:
     def frames(self) -> Iterator[Frame]:
         """All that can be read, in their order.
 
-        Returns: One `Frame` after the other; of a film that breaks off without the last one, which may be half a
+        Yields: One `Frame` after the other; of a film that breaks off without the last one, which may be half a
             picture.
         Raises: FilmError where there is none.
         """

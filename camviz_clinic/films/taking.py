@@ -34,6 +34,7 @@ class Chosen:
         pictures: By camera, in the order of their moments.
         notes: Sentences on each film: how many frames were used, how it was read, and where it is damaged.
 
+    >>> from pathlib import Path
     >>> Chosen({"camera": (Path("film_000012.png"),)}).notes
     ()
     """
@@ -43,7 +44,7 @@ class Chosen:
 
 
 @dataclass(frozen=True)
-class Choice:
+class FrameChoice:
     """How frames are chosen: what `chosen_frames` takes beside films and a folder."""
 
     board: Board
@@ -91,10 +92,17 @@ def chosen_frames(
 
     Returns: The pictures by camera.
     Raises: FilmError for a film that cannot be read, ValueError for a number below 1.
+
+    >>> from camviz_clinic.films.virtual import example
+    >>> from camviz_clinic.calibration import Board
+    >>> example("film.avi")  # a board of 4 by 3 corners, carried before a virtual camera
+    >>> chosen = chosen_frames([{"camera": "film.avi"}], "frames", Board(4, 3, 0.05), 3)
+    >>> len(chosen.pictures["camera"])
+    3
     """
     if frames < 1:
         raise ValueError(f"frames must be at least 1, got {frames}")
-    plan = Choice(board, frames, model, held, fixed, search)
+    plan = FrameChoice(board, frames, model, held, fixed, search)
     found, notes = _candidates(takes, Path(folder), plan, reading)
     left, showing = _choose(found, plan, looking)
     for place, candidate in enumerate(found):
@@ -110,7 +118,7 @@ def chosen_frames(
 
 
 def _candidates(
-    takes: Sequence[Mapping[str, Path_]], folder: Path, plan: Choice, reading: Step | None
+    takes: Sequence[Mapping[str, Path_]], folder: Path, plan: FrameChoice, reading: Step | None
 ) -> tuple[list[FilmedMoment], list[str]]:
     """The moments of all takes that are looked at, and what was noted of the films."""
     labels = _labels([Path(path) for take in takes for path in take.values()])
@@ -137,7 +145,7 @@ def _labels(paths: Sequence[Path]) -> dict[Path, str]:
     return named
 
 
-def _choose(found: Sequence[FilmedMoment], plan: Choice, looking: Step | None) -> tuple[list[int], dict[str, int]]:
+def _choose(found: Sequence[FilmedMoment], plan: FrameChoice, looking: Step | None) -> tuple[list[int], dict[str, int]]:
     """The chosen candidates' places, and by camera how many show the board."""
     names = dict.fromkeys(name for each in found for name in each.pictures)
     total, begun = sum(len(each.pictures) for each in found), 0
