@@ -39,7 +39,7 @@ _STAR = (228.0, 120.0, 78.0)  # centre and radius, µm
 _SPOKES = 36
 _MARGIN_UM = 40  # painted around the field, because a Fourier transform joins opposite ends
 _EDGE_UM = 75.0
-_WIDE = {"picture": 440, "curves": 340, "numbers": 180}
+_WIDE = {"picture": 400, "curves": 340, "numbers": 180}
 """The panels in their order, and how wide each is in picture units."""
 _COLOURS = ("red", "green", "blue")
 
@@ -167,11 +167,11 @@ class SharpnessView(View):
 
     @cached_property
     def _layout(self) -> dict[str, Cell]:
-        high = {"picture": 358, "curves": 406 + 54 * bool(self.yours), "numbers": 356}
+        high = {"picture": 328, "curves": 406 + 54 * bool(self.yours), "numbers": 356}
         return shortened(rows((max(high.values()), {name: w for name, w in _WIDE.items() if self._has(name)})), **high)
 
     def _picture_panel(self, left: float) -> str:
-        panel = image_panel("sensor", left + 10, 34, 420, *FIELD_UM)
+        panel = image_panel("sensor", left + 10, 34, 380, *FIELD_UM)
         shown = placed_image(panel, "sensor", *FIELD_UM, style="image-rendering:pixelated")
         note = f"{FIELD_UM[0] / 1000:g} × {FIELD_UM[1] / 1000:g} mm of the sensor"
         return panel.show(shown, title="What the pixels record", note=note)
