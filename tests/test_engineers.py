@@ -94,6 +94,7 @@ def test_a_report_of_the_gallery_shows_the_finding_that_its_page_names(patient):
 def test_the_gallery_is_written_with_an_index_that_leads_to_every_report(tmp_path, monkeypatch):
     monkeypatch.setattr(gallery, "PATIENTS", [each for each in gallery.PATIENTS if each.name == "fold"])
     gallery.write(tmp_path)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["fold.html", "index.html"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["fold.html", "fold.svg", "index.html"]
     assert 'href="fold.html"' in (tmp_path / "index.html").read_text(encoding="utf-8")
     assert "<svg" in (tmp_path / "fold.html").read_text(encoding="utf-8")
+    assert "pixels for a degree" in (tmp_path / "fold.svg").read_text(encoding="utf-8")

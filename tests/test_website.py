@@ -22,6 +22,7 @@ sys.path.insert(0, str(ROOT / "tools/website"))
 
 import clips  # noqa: E402
 import docstrings  # noqa: E402
+import engineers  # noqa: E402
 import mistakes  # noqa: E402
 import panes  # noqa: E402
 import pictures  # noqa: E402
@@ -112,6 +113,15 @@ def test_a_prediction_and_the_last_text_before_a_pane_lead_to_it():
 
 def test_sentences_without_a_pane_and_a_pane_without_sentences_have_the_whole_width():
     assert grouped("# One|a", "x", "b", "x", "P", "x") == "# One a x b x P x"
+
+
+def test_a_report_of_the_gallery_has_its_picture_and_no_other_page_changes():
+    page = (ROOT / "docs/engineers/gallery.md").read_text(encoding="utf-8")
+    shown = engineers.with_pictures(page)
+    assert re.findall(r"reports/([\w-]+)\.svg", shown) == re.findall(r"reports/([\w-]+)\.html", page)
+    assert re.sub(r"<img [^>]*> ", "", shown) == page
+    other = (ROOT / "docs/engineers/symptoms.md").read_text(encoding="utf-8")
+    assert engineers.with_pictures(other) == other
 
 
 def test_every_lesson_stands_on_the_map_once(tmp_path: Path):

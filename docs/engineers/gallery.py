@@ -1,4 +1,4 @@
-"""The reports of gallery.md: `python docs/engineers/gallery.py FOLDER` writes one HTML file for each, and an index.
+"""The reports of gallery.md: `python docs/engineers/gallery.py FOLDER` writes each as HTML, its picture, and an index.
 
 The calibrations are virtual, their faults those of camviz_clinic/checks/findings, as strong as the clinic is sure to
 name.
@@ -20,6 +20,7 @@ from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.inspection import Inspection
 from camviz_clinic.checks.virtual import healthy, healthy_pair
 from camviz_clinic.report.inspection import write_report
+from camviz_clinic.views.catalogue import ALIASES, VIEWS, Case
 
 SITE = "https://camviz.github.io/camviz/engineers/reports/"
 PAGE = Path(__file__).with_suffix(".md")
@@ -62,6 +63,22 @@ class Patient:
             return Inspection.of(Evidence(self.make(rng)))
         fault = faults()[self.fault]
         return Inspection.of(fault.inject(rng, self.strength or fault.promised))
+
+
+HEALTHY_VIEW = "residual-vectors"
+NARROW = 700  # picture units: wider panels have words that are too small in a table
+
+
+def picture(patient: Patient, inspection: Inspection) -> str:
+    """A panel of the view that shows the finding, as an SVG document: one that can be read when it is small."""
+    found = [finding for finding in inspection.findings if finding.id == patient.finding]
+    name, camera = (found[0].view, found[0].camera or "") if found else (HEALTHY_VIEW, "")
+    calibration = inspection.calibration
+    assert calibration is not None  # all patients can be read
+    shown = VIEWS[ALIASES.get(name, name)].view(Case(calibration), camera).figure()
+    boards = [tile for tile in shown.tiles if tile.name == "the board"]
+    narrow = [tile for tile in shown.tiles if tile.cell[2] <= NARROW]
+    return shown.document((boards + narrow + list(shown.tiles))[0])
 
 
 PATIENTS = (
@@ -111,7 +128,9 @@ def write(folder: Path) -> None:
     """The reports and index.html."""
     folder.mkdir(parents=True, exist_ok=True)
     for each in PATIENTS:
-        write_report(each.inspection(), folder / f"{each.name}.html")
+        inspection = each.inspection()
+        write_report(inspection, folder / f"{each.name}.html")
+        (folder / f"{each.name}.svg").write_text(picture(each, inspection), encoding="utf-8")
     items = (f'<li><a href="{each.name}.html">{escape(each.title)}</a>: {escape(each.see)}</li>' for each in PATIENTS)
     (folder / "index.html").write_text(document("A gallery of reports", f"<ul>{''.join(items)}</ul>"), encoding="utf-8")
 

@@ -83,7 +83,10 @@ def lay_out(recorder: panes.Recorder) -> None:
     made = {SOURCE / name: text for name, text in {**course_pages(BUILT / PICTURES), **api_pages()}.items()}
     for path in documents:
         way = path.relative_to(ROOT).as_posix()
-        made[SOURCE / way] = on_site(path.read_text(encoding="utf-8"), way, pages, ROOT)
+        text = path.read_text(encoding="utf-8")
+        made[SOURCE / way] = on_site(
+            engineers.with_pictures(text) if path.stem == "gallery" else text, way, pages, ROOT
+        )
     made[SOURCE / f"{engineers.front(ROOT)}.md"] += engineers.contents(ROOT)
     for path in notebooks:
         live = {number: pane["html"] for number, pane in moving[path.name[:2]].items()}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -22,6 +23,12 @@ def contents(root: Path) -> str:
     others = [page for page in (*pages, "/docs/clinic", "/docs/formats") if page != f"/{front(root)}"]
     listed = "\n".join(others)
     return f"\n```{{toctree}}\n:hidden:\n\n{listed}\n```\n"
+
+
+def with_pictures(page: str) -> str:
+    """A page's table of reports with a picture before each, which `write_reports` has written."""
+    image = rf'<img src="../../{REPORTS}/\2.svg" alt="" width="240" loading="lazy">'
+    return re.sub(rf"^\| (\[[^\]]+\]\(\S*{REPORTS}/([\w-]+)\.html\))", rf"| {image} \1", page, flags=re.MULTILINE)
 
 
 def write_reports(root: Path, site: Path) -> None:
