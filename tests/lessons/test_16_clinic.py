@@ -478,6 +478,8 @@ def test_losses_that_forgive(says):
     from scipy.optimize import least_squares
 
     says("Cauchy's loss has w = 1/(1 + r²/c²), and there the force falls again.")
+    limit, sigma = says("Below, c is 0.4 px for noise of σ = 0.15 px.")
+    assert sigma == FaultLabView(strength=0.0, seed=5).noise
     least, shift, huber, cauchy = says(
         "With least squares the harm grows with the fault, to 0.97 px at 8 px. With Huber's weights it stays below "
         "0.07 px: bounded, and not zero. Cauchy's is below 0.02 px there"
@@ -496,7 +498,7 @@ def test_losses_that_forgive(says):
 
         _, turn, t = cv2.solvePnP(board, corners, K, bend)
         start = np.concatenate([turn, t])[:, 0]
-        c = 0.4
+        c = limit.value
         force = {
             "linear": lambda r: r,
             "huber": lambda r: np.sqrt(np.where(r <= c, r**2, 2 * c * r - c**2)),
