@@ -27,7 +27,7 @@ def contents(root: Path) -> str:
 
 def with_pictures(page: str) -> str:
     """A page's table of reports with a picture before each, which `write_reports` has written."""
-    image = rf'<img src="../../{REPORTS}/\2.svg" alt="" width="240" loading="lazy">'
+    image = rf'<img src="../../{REPORTS}/\2.svg" alt="" width="240" loading="lazy"><br>'
     return re.sub(rf"^\| (\[[^\]]+\]\(\S*{REPORTS}/([\w-]+)\.html\))", rf"| {image} \1", page, flags=re.MULTILINE)
 
 
