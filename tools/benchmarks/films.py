@@ -95,9 +95,10 @@ def off(camera: Camera, uv: np.ndarray) -> float:
     from scipy.spatial.transform import Rotation
 
     true, found = (each.lens.unproject(each.intrinsics.from_pixels(uv)) for each in (CAMERA, camera))
-    turn, _ = Rotation.align_vectors(found, true)
+    rays = np.isfinite(true).all(axis=1) & np.isfinite(found).all(axis=1)  # a bad solution has none at the border
+    turn, _ = Rotation.align_vectors(found[rays], true[rays])
     again = camera.intrinsics.to_pixels(camera.lens.project(turn.apply(true)))
-    return float(np.sqrt(np.mean(np.sum((again - uv) ** 2, axis=-1))))
+    return float(np.sqrt(np.nanmean(np.sum((again - uv) ** 2, axis=-1))))
 
 
 if __name__ == "__main__":
