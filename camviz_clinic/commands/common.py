@@ -126,17 +126,23 @@ def whole_folder(output: Path) -> Iterator[Path]:
     """
     refuse_folder(output)
     target = output.resolve()
+    with _refused(output), TemporaryDirectory(dir=target.parent, prefix=".camviz-") as room:
+        part = Path(room) / "part"
+        part.mkdir()
+        yield part
+        if target.exists():
+            target.rmdir()
+        os.replace(part, target)
+
+
+@contextmanager
+def _refused(output: Path) -> Iterator[None]:
+    """Tells what the system cannot write as of `output`: the error's own file name is that of a part of it."""
     try:
-        with TemporaryDirectory(dir=target.parent, prefix=".camviz-") as room:
-            part = Path(room) / "part"
-            part.mkdir()
-            yield part
-            if target.exists():
-                target.rmdir()
-            os.replace(part, target)
+        yield
     except BrokenPipeError:
         raise
-    except OSError as error:  # whose file name is that of the part
+    except OSError as error:
         refuse_exhausted(error)
         raise Refusal(f"{output}: cannot be written ({error.strerror or error}).") from error
 
@@ -170,22 +176,17 @@ def write_whole(path: Path, write: Callable[[Path], object], name: str = "page.p
     A file that is replaced keeps its permissions. `name` is what `write` sees, where the ending matters to it.
     """
     target = path.resolve()  # a link is followed, not replaced
-    try:
-        with TemporaryDirectory(dir=None if path == STREAM else target.parent, prefix=".camviz-") as beside:
-            temporary = Path(beside) / name
-            write(temporary)
-            if path == STREAM:
-                sys.stdout.flush()
-                sys.stdout.buffer.write(temporary.read_bytes())
-                return
-            if target.exists():
-                shutil.copymode(target, temporary)
-            os.replace(temporary, target)
-    except BrokenPipeError:
-        raise
-    except OSError as error:  # whose file name is that of the part
-        refuse_exhausted(error)
-        raise Refusal(f"{path}: cannot be written ({error.strerror or error}).") from error
+    place = None if path == STREAM else target.parent
+    with _refused(path), TemporaryDirectory(dir=place, prefix=".camviz-") as beside:
+        temporary = Path(beside) / name
+        write(temporary)
+        if path == STREAM:
+            sys.stdout.flush()
+            sys.stdout.buffer.write(temporary.read_bytes())
+            return
+        if target.exists():
+            shutil.copymode(target, temporary)
+        os.replace(temporary, target)
 
 
 def write_calibration(calibration: Calibration, output: Path, form: str) -> tuple[str, ...]:

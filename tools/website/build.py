@@ -83,10 +83,8 @@ def lay_out(recorder: panes.Recorder) -> None:
     made = {SOURCE / name: text for name, text in {**course_pages(BUILT / PICTURES), **api_pages()}.items()}
     for path in documents:
         way = path.relative_to(ROOT).as_posix()
-        text = path.read_text(encoding="utf-8")
-        made[SOURCE / way] = on_site(
-            engineers.with_pictures(text) if path.stem == "gallery" else text, way, pages, ROOT
-        )
+        text = engineers.with_pictures(path.read_text(encoding="utf-8"))
+        made[SOURCE / way] = on_site(text, way, pages, ROOT)
     made[SOURCE / f"{engineers.front(ROOT)}.md"] += engineers.contents(ROOT)
     for path in notebooks:
         live = {number: pane["html"] for number, pane in moving[path.name[:2]].items()}
