@@ -3,6 +3,7 @@
 import cv2
 import numpy as np
 import pytest
+from scipy import ndimage
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz import twoview
@@ -10,6 +11,7 @@ from camviz.scenes import snapshot, textured_scene
 from camviz_school.course.checks import judge
 from camviz_school.course.exercises import exercise
 from camviz_school.course.material import module
+from camviz_school.samples import motorcycle
 from camviz_school.views.rectification import RectificationView
 
 lesson08 = module("08")
@@ -395,6 +397,124 @@ def test_the_strip_that_the_left_right_check_removes(says):
     kept = lesson08.left_right(d_left, d_right, 0.5)
     assert strip == np.isnan(kept[right:]).sum()
     assert np.isnan(kept[30 - int(strip.value) : 30]).all()  # on its left
+
+
+# Another light, between two pixels, and how sure ---------------------------------------------------------------------
+
+
+BLOCK = 9
+
+
+def answered(grey):
+    """The census answers (height, width, 25), with the picture's wrap-around that the lesson's np.roll has."""
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(grey, 2, mode="wrap"), (5, 5))
+    return (windows < grey[..., None, None]).reshape(*grey.shape, 25)
+
+
+def searched(left, right, apart, count=32):
+    """Costs (count, height, width) by summing what `apart` says of two pixels over each block, one by one."""
+    height, width = left.shape[:2]
+    costs = np.full((count, height, width), np.inf)
+    for d in range(count):
+        one = np.pad(apart(left[:, d:], right[:, : width - d]).astype(float), BLOCK // 2, mode="reflect")
+        costs[d, :, d:] = np.lib.stride_tricks.sliding_window_view(one, (BLOCK, BLOCK)).sum(axis=(2, 3))
+    return costs
+
+
+def by_grey(one, other):
+    return np.abs(one.astype(float) - other)
+
+
+def by_answers(one, other):
+    return (one != other).sum(axis=-1)
+
+
+@pytest.fixture(scope="module")
+def searches():
+    """Where each cost finds a partner on the motorcycle, in the same light and a fifth darker; and the truth."""
+    bike = motorcycle(width=370)
+    left, right = (cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY) for picture in (bike.left, bike.right))
+    costs = {}
+    for light in (1.0, 0.8):
+        dimmed = np.rint(light * right)
+        costs["greys", light] = searched(left, dimmed, by_grey)
+        costs["census", light] = searched(answered(left), answered(dimmed), by_answers)
+    return costs, bike
+
+
+def test_what_the_census_transform_keeps_in_another_light(says, searches):
+    high, wide = says("Two costs look for each pixel's partner in blocks of 9 × 9 pixels")
+    assert high == BLOCK
+    assert wide == BLOCK
+    costs, bike = searches
+    known = np.isfinite(bike.disparity)
+    off = {one: np.mean(np.abs(c.argmin(axis=0) - bike.disparity)[known] > 1) for one, c in costs.items()}
+    says("The greys lose most of the map, and the census transform next to nothing.")
+    assert off["greys", 0.8] > 0.5
+    assert abs(off["census", 0.8] - off["census", 1.0]) < 0.01
+    assert off["census", 1.0] < off["greys", 1.0]  # in the same light it is the better cost as well
+
+
+def test_four_neighbours_by_hand(says):
+    middle, *rest = says(
+        "One pixel, by hand: grey 100, and four neighbours of 80, 120, 99 and 100. The answers are yes, no, yes, no. A "
+        "fifth darker, the pixel is 80, the neighbours are 64, 96, 79.2 and 80, and the answers are the same."
+    )
+    greys = np.array([float(one.value) for one in rest if one.value != 4])
+    before, after = greys[:4], greys[-4:]
+    np.testing.assert_allclose(after, 0.8 * before)
+    assert list(before < float(middle.value)) == list(after < 0.8 * float(middle.value)) == [True, False, True, False]
+
+
+def test_leaving_out_what_is_least_sure(says, searches):
+    says("Leave out the fifth of which the matcher is least sure, and three in four mistakes are gone.")
+    costs, bike = searches
+    costs = costs["census", 0.8]
+    best = costs.argmin(axis=0)
+    others = np.where(np.abs(np.arange(32)[:, None, None] - best) >= 2, costs, np.inf)
+    share = costs.min(axis=0) / others.min(axis=0)
+    known = np.isfinite(bike.disparity)
+    wrong = known & (np.abs(best - bike.disparity) > 1)
+    sure = share <= np.quantile(share[known], 0.8)
+    assert 1 - (wrong & sure).sum() / wrong.sum() == pytest.approx(3 / 4, abs=0.02)
+
+
+def test_a_parabola_through_three_costs(says):
+    *three, delta = says("One minimum, by hand: the costs are 50, 20 and 40. The parabola is least at δ = 0.1")
+    three = [float(one.value) for one in three if one.value >= 20]
+    a, b, _ = np.polyfit([-1, 0, 1], three, 2)
+    assert delta == -b / (2 * a)
+    assert lesson08.between_pixels(*np.array(three)) == pytest.approx(0.1)
+
+
+def test_places_are_drawn_to_the_nearest_whole_pixel(says):
+    """By spectra of its own seed, and moved by waves of the whole length: SciPy's, not the lesson's."""
+    (sharp,) = says(
+        "the found places are drawn to the nearest whole pixel: by up to 0.10 px with |difference|, and by a quarter "
+        "of that with its square."
+    )
+    rng, n = np.random.default_rng(1), 2**15
+    row = ndimage.gaussian_filter1d(rng.normal(size=n), 1.0, mode="wrap")
+    bias = {1: [], 2: []}
+    for s in np.arange(0.05, 0.5, 0.05):
+        moved = np.fft.ifft(ndimage.fourier_shift(np.fft.fft(row), s)).real
+        for power, found in bias.items():
+            costs = [np.abs(row - np.roll(moved, -d)) ** power for d in (-1, 0, 1)]
+            costs = np.array([one[: n // 15 * 15].reshape(-1, 15).sum(axis=1) for one in costs])
+            found.append(s - np.nanmedian(lesson08.between_pixels(*costs)))
+    assert min(bias[1] + bias[2]) > 0  # towards 0, the nearest whole pixel
+    assert sharp == max(bias[1])
+    assert max(bias[2]) / max(bias[1]) == pytest.approx(1 / 4, abs=0.015)
+
+
+def test_what_parts_of_a_pixel_are_worth_on_the_motorcycle(says):
+    bike = motorcycle(width=370)
+    far, step = says("half a pixel at 3 m is 5 cm here")
+    a_metre = float(far.value) ** 2 / (bike.focal_length * bike.baseline)
+    assert step == 100 * 0.5 * a_metre
+    softly, as_far = says("A tenth of a pixel is 9 mm for the motorcycle at 3 m")
+    assert as_far == far.value
+    assert softly == 1000 * 0.1 * a_metre
 
 
 # The photographs -----------------------------------------------------------------------------------------------------

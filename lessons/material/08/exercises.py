@@ -844,4 +844,153 @@ def nothing_dropped(d_left, d_right, tolerance):
     return d_left
 
 
-EXERCISES = (RECTIFIED, LEFT_RIGHT, BASELINE, DEPTH, METRIC_DEPTH)
+# 6: between two pixels -----------------------------------------------------------------------------------------------
+
+
+def between_pixels(c_before: Array, c_best: Array, c_after: Array) -> Array:
+    """δ (...), −½ … ½, where the parabola through three costs is least; NaN where c_best is not least, or all agree."""
+    curved = c_before - 2 * c_best + c_after
+    least = (c_best <= c_before) & (c_best <= c_after) & (curved > 0)
+    return np.where(least, (c_before - c_after) / (2 * np.where(least, curved, 1)), np.nan)
+
+
+def _between_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    """In each larger case one minimum is halfway on either side, one cost is no minimum, and three agree."""
+    for shape in SHAPES:
+        best = rng.uniform(-80, 80, shape)  # a cost may be a correlation with its sign turned
+        best.flat[2:4] = -rng.uniform(10, 80, len(best.flat[2:4]))
+        before, after = best + rng.uniform(1, 60, shape), best + rng.uniform(1, 60, shape)
+        if best.size > 5:
+            before.flat[0] = best.flat[0]
+            after.flat[1] = best.flat[1]
+            before.flat[2] = best.flat[2] - rng.uniform(0.1, 5)
+            after.flat[3] = best.flat[3] - rng.uniform(0.1, 5)
+            before.flat[4] = after.flat[4] = best.flat[4]
+            before.flat[5] = after.flat[5] = best.flat[5] - rng.uniform(1, 5)
+        yield before, best, after
+
+
+BETWEEN = Exercise(
+    name="08.between_pixels",
+    reference=between_pixels,
+    cases=_between_cases,
+    hints=(
+        "Draw the three costs side by side, and the parabola `a * x**2 + b * x + c` through them, with x = 0 in the "
+        "middle. There c is the cost. What are a and b?",
+        "The sum and the difference of the two outer costs give `2 * a` and `2 * b`. The parabola is least at "
+        "`-b / (2 * a)`. If all three are the same, a is 0.",
+        "`return np.where(least, (c_before - c_after) / (2 * ___), np.nan)`",
+    ),
+    praise="Three costs, and the disparity is known to a fraction of a pixel.",
+)
+
+
+def _dressed(delta, c_before, c_best, c_after):
+    """An answer, with NaN where it is wanted."""
+    return np.where(np.isfinite(between_pixels(c_before, c_best, c_after)), delta, np.nan)
+
+
+def _over(above, below):
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return above / below
+
+
+@BETWEEN.right
+def by_a_and_b(c_before, c_best, c_after):
+    a, b = (c_before + c_after) / 2 - c_best, (c_after - c_before) / 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        delta = -b / (2 * a)
+    return np.where((c_best <= np.minimum(c_before, c_after)) & (a != 0), delta, np.nan)
+
+
+@BETWEEN.right
+def by_polyfit(c_before, c_best, c_after):
+    def one(before, best, after):
+        if best > min(before, after) or before == best == after:
+            return np.nan
+        a, b, _ = np.polyfit([-1, 0, 1], [before, best, after], 2)
+        return -b / (2 * a)
+
+    three = (np.ravel(c) for c in (c_before, c_best, c_after))
+    return np.reshape([one(*costs) for costs in zip(*three, strict=True)], np.shape(c_best))
+
+
+@BETWEEN.right
+def where_two_slopes_meet_zero(c_before, c_best, c_after):
+    """The slope is c_best − c_before at −½ and c_after − c_best at ½, and a straight line in between."""
+    left, right = c_best - c_before, c_after - c_best
+    return np.where((left <= 0) & (right >= 0), -0.5 - _over(left, right - left), np.nan)
+
+
+@BETWEEN.wrong("You go away from the smaller neighbour. Where c_after is the smaller one, δ is above 0.")
+def away_from_the_smaller(c_before, c_best, c_after):
+    return -between_pixels(c_before, c_best, c_after)
+
+
+@BETWEEN.wrong(
+    "This is twice too far: the slope of `a * x**2 + b * x` is `2 * a * x + b`. A minimum halfway gives ±½, not ±1."
+)
+def twice_too_far(c_before, c_best, c_after):
+    return 2 * between_pixels(c_before, c_best, c_after)
+
+
+@BETWEEN.wrong("This is half of it: `c_before - 2 * c_best + c_after` is `2 * a` already.")
+def half_of_it(c_before, c_best, c_after):
+    return between_pixels(c_before, c_best, c_after) / 2
+
+
+@BETWEEN.wrong("The middle cost counts twice in `c_before - 2 * c_best + c_after`, and you took it once.")
+def middle_counted_once(c_before, c_best, c_after):
+    delta = _over(c_before - c_after, 2 * (c_before - c_best + c_after))
+    return _dressed(delta, c_before, c_best, c_after)
+
+
+@BETWEEN.wrong("You added the middle cost where it is subtracted: `c_before - 2 * c_best + c_after`.")
+def middle_added(c_before, c_best, c_after):
+    delta = _over(c_before - c_after, 2 * (c_before + 2 * c_best + c_after))
+    return _dressed(delta, c_before, c_best, c_after)
+
+
+@BETWEEN.wrong("The middle cost is left out. Raise all three by as much, and δ must stay as it is.")
+def middle_left_out(c_before, c_best, c_after):
+    return _dressed(_over(c_before - c_after, 2 * (c_before + c_after)), c_before, c_best, c_after)
+
+
+@BETWEEN.wrong("Where c_best is not the least of the three, the parabola's minimum is not near it: NaN is wanted.")
+def followed_too_far(c_before, c_best, c_after):
+    return _over(c_before - c_after, 2 * (c_before - 2 * c_best + c_after))
+
+
+@BETWEEN.wrong("Only one neighbour is compared with c_best. Neither may be below it.")
+def one_neighbour_asked(c_before, c_best, c_after):
+    delta = followed_too_far(c_before, c_best, c_after)
+    return np.where((c_best <= c_before) & np.isfinite(delta), delta, np.nan)
+
+
+@BETWEEN.wrong("Where a neighbour's cost is as low as the best one, the minimum is halfway, ±½, and not unknown.")
+def ties_dropped(c_before, c_best, c_after):
+    return np.where((c_best < c_before) & (c_best < c_after), between_pixels(c_before, c_best, c_after), np.nan)
+
+
+@BETWEEN.wrong("A 0 says that the minimum is right at this pixel. Where nobody knows, NaN is the answer.")
+def zero_for_unknown(c_before, c_best, c_after):
+    return np.nan_to_num(between_pixels(c_before, c_best, c_after))
+
+
+@BETWEEN.wrong("These are two straight lines of one slope, a V. Asked for is the parabola through the three costs.")
+def two_straight_lines(c_before, c_best, c_after):
+    steep = 2 * (np.maximum(c_before, c_after) - c_best)
+    return _dressed(_over(c_before - c_after, steep), c_before, c_best, c_after)
+
+
+@BETWEEN.wrong("This is the least cost of the parabola, and wanted is the place δ where it is least.")
+def the_cost_there(c_before, c_best, c_after):
+    return c_best - (c_before - c_after) * between_pixels(c_before, c_best, c_after) / 4
+
+
+@BETWEEN.wrong("You clip δ to −½ … ½. An answer beyond it says that c_best is not the least: NaN.")
+def clipped(c_before, c_best, c_after):
+    return np.clip(followed_too_far(c_before, c_best, c_after), -0.5, 0.5)
+
+
+EXERCISES = (RECTIFIED, LEFT_RIGHT, BASELINE, DEPTH, BETWEEN, METRIC_DEPTH)
