@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from camviz.scenes import textured_scene
 from camviz.views import garden
 from camviz.views.epipolar import EpipolarView
+from camviz_school.course.exercises import exercise
 
 EXCEPTIONS: dict[str, str] = {}
 
@@ -353,6 +354,146 @@ def test_how_many_draws(says):
     assert np.ceil(np.log(rest.value) / np.log(1 - share.value**8)) == 117
     lucky = 1 - (1 - share.value**8) ** 117
     assert lucky > sure.value / 100
+
+
+# One plane, and the model that is enough -----------------------------------------------------------------------------
+
+
+def torr(distances, dimension, parameters, sigma):
+    """GRIC, written as Torr has it: ρ for each pair, λ₁ = ln r, λ₂ = ln(r n), λ₃ = 2."""
+    r, n = 4, len(distances)
+    rho = [min(d * d / sigma**2, 2 * (r - dimension)) for d in distances]
+    return sum(rho) + np.log(r) * dimension * n + np.log(r * n) * parameters
+
+
+def off_a_homography(H, left, right):
+    """First-order distances (n,) in the space of (u, v, u', v') from x' × H x = 0 (H&Z, section 4.2.6)."""
+    w = homogeneous(left) @ H.T
+    e = np.stack([w[:, 0] - right[:, 0] * w[:, 2], w[:, 1] - right[:, 1] * w[:, 2]], axis=-1)
+    J = np.zeros((len(left), 2, 4))
+    for row in range(2):
+        J[:, row, :2] = H[row, :2] - right[:, row, None] * H[2, :2]
+        J[:, row, 2 + row] = -w[:, 2]
+    return np.sqrt(np.einsum("ni,nij,nj->n", e, np.linalg.inv(J @ J.transpose(0, 2, 1)), e))
+
+
+def sampson_by_opencv(F, left, right):
+    pairs = zip(homogeneous(left), homogeneous(right), strict=True)
+    return [np.sqrt(cv2.sampsonDistance(*pair, F)) for pair in pairs]
+
+
+def wall_pairs(thickness, n, distance, noise, rng):
+    """Noisy pairs of the wall, and exact ones of the room around it."""
+    view = EpipolarView(roll=10.0, right_z=0.3)
+    across, before = rng.uniform((-1.5, -1.1), (1.5, 1.1), (n, 2)), rng.uniform(-0.5, 0.5, n)
+    found = []
+    for depth, sigma in ((distance + thickness * before, noise), (rng.uniform(2, 8, n), 0)):
+        world = view.left.world_from_cam.apply(np.column_stack([across, depth]))
+        found += [one.project(world) + rng.normal(0, sigma, (n, 2)) for one in (view.left, view.right)]
+    return found
+
+
+def test_on_a_wall_the_best_f_knows_nothing_of_the_room(says):
+    (far,) = says("Sixty points lie on a wall, 4 m away. Two cameras see them, with half a pixel of noise.")
+    says("On the wall F fits best, and everywhere else it is useless.")
+    on_wall, in_room, by_plane = [], [], []
+    for seed in range(20):
+        left, right, *room = wall_pairs(0, 60, far.value, 0.5, np.random.default_rng(seed))
+        F = eight_point(left, right)
+        on_wall.append(np.sqrt(np.mean(off_their_lines(F, left, right) ** 2)))
+        in_room.append(off_their_lines(F, *room).mean())
+        by_plane.append(np.sqrt(np.mean(off_a_homography(cv2.findHomography(left, right)[0], left, right) ** 2)))
+    assert max(on_wall) < 1.2 < 5 < np.median(in_room)  # both pictures' noise, 0.5 px across each line, is 0.7 px
+    assert np.mean(by_plane) == pytest.approx(0.5 * np.sqrt(2 * (1 - 8 / 120)), rel=0.02)  # two of four numbers fixed
+
+
+def test_for_one_plane_every_epipole_gives_an_f_of_all_pairs(says):
+    says(
+        "Then every … satisfies all pairs, whatever the epipole e is: the line through e and Hx always passes "
+        "through Hx."
+    )
+    left, right, *_ = wall_pairs(0, 30, 4.0, 0.0, np.random.default_rng(3))
+    H = cv2.findHomography(left, right)[0]
+    for e in ([100.0, 900.0, 1.0], [-3000.0, 20.0, 1.0], [1.0, 0.0, 0.0]):
+        assert off_their_lines(cross_matrix(np.array(e)) @ H, left, right).max() < 1e-3
+
+
+def test_the_prices_of_both_models(says):
+    """F: a pair (u, v, u', v') on a hypersurface; H: on a surface; as many parameters as their scale leaves free."""
+    quoted = says("with D = 3 and k = 7 for F, D = 2 and k = 8 for H.")
+    D_of_F, k_of_F, D_of_H, k_of_H = quoted
+    assert D_of_F == 4 - 1  # one equation: xᵀFx = 0
+    assert k_of_F == 9 - 1 - 1  # scale and rank
+    assert D_of_H == 4 - 2
+    assert k_of_H == 9 - 1
+
+
+def test_one_pair_s_share_by_hand(says):
+    sigma, near, far, square, for_F, for_H = says(
+        "with σ = 0.5 px, a distance of 0.5 px counts 1. One of 3 px would count 36, and it counts 2 for F and 4 for H."
+    )
+    assert (near.value / sigma.value) ** 2 == 1
+    assert square == (far.value / sigma.value) ** 2
+    prices = [torr([0.0], D, 0, sigma.value) for D in (3, 2)]
+    assert for_F == torr([far.value], 3, 0, sigma.value) - prices[0]
+    assert for_H == torr([far.value], 2, 0, sigma.value) - prices[1]
+
+
+def test_the_exercise_is_torr_s_sum():
+    for arguments in exercise("07.gric").cases(np.random.default_rng(1)):
+        assert exercise("07.gric").reference(*arguments) == pytest.approx(torr(*arguments), rel=1e-12)
+
+
+def test_up_to_which_thickness_a_homography_is_enough(says):
+    """With the lesson's points and noise, drawn from its seed."""
+    (thick,) = says("Up to 8 cm the homography is enough.")
+    rng, n, sigma = np.random.default_rng(7), 60, 0.5
+    across, before = rng.uniform((-1.5, -1.1), (1.5, 1.1), (n, 2)), rng.uniform(-0.5, 0.5, n)
+    noise, view = rng.normal(size=(2, n, 2)), EpipolarView(roll=10.0, right_z=0.3)
+    enough = []
+    for centimetres in range(0, 32, 2):
+        world = view.left.world_from_cam.apply(np.column_stack([across, 4 + centimetres / 100 * before]))
+        left, right = (
+            one.project(world) + sigma * error for one, error in zip((view.left, view.right), noise, strict=True)
+        )
+        F, H = eight_point(left, right), cv2.findHomography(left, right)[0]
+        off_lines = sampson_by_opencv(F, left, right)
+        off_plane = np.linalg.norm(cv2.perspectiveTransform(left[None], H)[0] - right, axis=1) / np.sqrt(2)
+        assert np.sqrt(np.mean(off_plane**2)) == pytest.approx(
+            np.sqrt(np.mean(off_a_homography(H, left, right) ** 2)), rel=0.05
+        )
+        enough.append(torr(off_plane, 2, 8, sigma) < torr(off_lines, 3, 7, sigma))
+    assert thick == 2 * (enough.index(False) - 1)
+    assert not any(enough[enough.index(False) :])
+
+
+def test_every_board_alone_asks_for_a_homography_and_two_for_f(says, rig):
+    says("By the right sums, a homography is enough for every board alone, and F is needed as soon as there are two.")
+
+    def for_a_plane(left, right):
+        F, H = eight_point(left, right), cv2.findHomography(left, right)[0]
+        off_lines = sampson_by_opencv(F, left, right)
+        return torr(off_a_homography(H, left, right), 2, 8, 0.2) < torr(off_lines, 3, 7, 0.2)
+
+    left, right = (np.float64(rig[side][3]).reshape(-1, 54, 2) for side in ("left", "right"))
+    assert all(for_a_plane(*one) for one in zip(left, right, strict=True))
+    together = [one.reshape(-1, 2) for one in (left[:2], right[:2])]
+    assert not for_a_plane(*together)
+
+
+def test_on_a_plane_calibrated_cameras_leave_two_motions(says):
+    """OpenCV's four decompositions of H; points of the plane in front of both cameras leave two at most."""
+    says("for points of one plane, however many, at most two motions remain, not a whole family.")
+    view = EpipolarView(roll=10.0, right_z=0.3)
+    left, right, *_ = wall_pairs(0, 40, 4.0, 0.0, np.random.default_rng(5))
+    K = view.left.intrinsics.K
+    H = cv2.findHomography(left, right)[0]
+    _, turns, _, normals = cv2.decomposeHomographyMat(H, K)
+    rays = homogeneous(left) @ np.linalg.inv(K).T
+    in_front = [i for i, normal in enumerate(normals) if (rays @ normal > 0).all()]
+    assert 1 <= len(in_front) <= 2
+    true = (view.right.cam_from_world * view.left.world_from_cam).rotation.as_matrix()
+    assert min(np.abs(turns[i] - true).max() for i in in_front) < 1e-3
 
 
 # 5: the motion inside E ----------------------------------------------------------------------------------------------

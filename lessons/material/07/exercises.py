@@ -850,4 +850,139 @@ def pictures_swapped(F, uv_left, uv_right):
     return sampson(F.T, uv_left, uv_right)
 
 
-EXERCISES = (FUNDAMENTAL, LINE, EPIPOLE, EIGHT_POINT, IN_FRONT, SAMPSON)
+# 7: the model that is enough -----------------------------------------------------------------------------------------
+
+
+def gric(distances: Array, dimension: int, parameters: int, sigma: float) -> float:
+    """Σ min(d²/σ², 2 (4 − D)) + D n ln 4 + k ln 4n of n pairs (Torr 2002, eq. 19, with r = 4 and λ₃ = 2)."""
+    n = len(distances)
+    residuals = np.minimum(distances**2 / sigma**2, 2 * (4 - dimension)).sum()
+    return float(residuals + dimension * n * np.log(4) + parameters * np.log(4 * n))
+
+
+def _gric_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    """Both models, noise of several sizes, and mistakes among the pairs."""
+    for n, (dimension, parameters) in ((40, (3, 7)), (40, (2, 8)), (9, (3, 7)), (13, (2, 8)), (25, (1, 3))):
+        sigma = float(rng.uniform(0.3, 3))
+        distances = np.abs(rng.normal(0, sigma, n))
+        distances[: n // 4] += rng.uniform(5, 50, n // 4)
+        yield distances, dimension, parameters, sigma
+
+
+GRIC = Exercise(
+    name="07.gric",
+    reference=gric,
+    cases=_gric_cases,
+    hints=(
+        "Three terms: what the pairs miss the model by, what its dimension costs for each pair, and what its "
+        "parameters cost. Which of them is a sum over the pairs?",
+        "`np.minimum(a, b)` takes the smaller one, pair by pair, and `.sum()` adds up. `len(distances)` is n, and "
+        "`np.log` is the natural logarithm.",
+        "`residuals = np.minimum(distances**2 / ___, 2 * (4 - dimension)).sum()`",
+    ),
+    praise="Now a model has to earn its freedom.",
+)
+
+
+def _penalty(distances, dimension, parameters):
+    return dimension * len(distances) * np.log(4) + parameters * np.log(4 * len(distances))
+
+
+@GRIC.right
+def one_share_after_the_other(distances, dimension, parameters, sigma):
+    total = parameters * np.log(4 * len(distances))
+    for d in distances:
+        total += min((d / sigma) ** 2, 8 - 2 * dimension) + np.log(4**dimension)
+    return total
+
+
+@GRIC.right
+def with_r_named(distances, dimension, parameters, sigma):
+    r, n = 4, np.size(distances)
+    rho = np.where((distances / sigma) ** 2 < 2 * (r - dimension), (distances / sigma) ** 2, 2 * (r - dimension))
+    return np.sum(rho) + np.log(r) * dimension * n + np.log(r * n) * parameters
+
+
+@GRIC.wrong("Nothing is cut off: one wrong pair decides then. Each pair has a limit.")
+def nothing_cut_off(distances, dimension, parameters, sigma):
+    return np.sum(distances**2 / sigma**2) + _penalty(distances, dimension, parameters)
+
+
+@GRIC.wrong("The *sum* is cut off. Each pair is to be, before the sum.")
+def the_sum_cut_off(distances, dimension, parameters, sigma):
+    return min(np.sum(distances**2 / sigma**2), 2 * (4 - dimension)) + _penalty(distances, dimension, parameters)
+
+
+@GRIC.wrong("The distances are not squared: d²/σ².")
+def not_squared(distances, dimension, parameters, sigma):
+    return np.minimum(distances / sigma, 2 * (4 - dimension)).sum() + _penalty(distances, dimension, parameters)
+
+
+@GRIC.wrong("d² is divided by σ. It is σ²: the quotient then has no unit.")
+def sigma_not_squared(distances, dimension, parameters, sigma):
+    return np.minimum(distances**2 / sigma, 2 * (4 - dimension)).sum() + _penalty(distances, dimension, parameters)
+
+
+@GRIC.wrong("The noise is left out. A distance of a pixel is much where σ is a tenth of it, and little where σ is two.")
+def without_the_noise(distances, dimension, parameters, sigma):
+    return np.minimum(distances**2, 2 * (4 - dimension)).sum() + _penalty(distances, dimension, parameters)
+
+
+@GRIC.wrong("The larger one is taken where the smaller one is wanted: `np.minimum`.")
+def maximum_taken(distances, dimension, parameters, sigma):
+    limited = np.maximum(distances**2 / sigma**2, 2 * (4 - dimension))
+    return limited.sum() + _penalty(distances, dimension, parameters)
+
+
+@GRIC.wrong("The limit of a pair is twice as high: `2 * (4 - dimension)`.")
+def limit_halved(distances, dimension, parameters, sigma):
+    limited = np.minimum(distances**2 / sigma**2, 4 - dimension)
+    return limited.sum() + _penalty(distances, dimension, parameters)
+
+
+@GRIC.wrong("The limit goes by what the model fixes, `4 - dimension`. You took what it leaves free.")
+def limit_by_what_is_free(distances, dimension, parameters, sigma):
+    limited = np.minimum(distances**2 / sigma**2, 2 * dimension)
+    return limited.sum() + _penalty(distances, dimension, parameters)
+
+
+@GRIC.wrong("The price of the dimension is paid for each pair: once more n.")
+def dimension_paid_once(distances, dimension, parameters, sigma):
+    n = len(distances)
+    return gric(distances, dimension, parameters, sigma) - dimension * (n - 1) * np.log(4)
+
+
+@GRIC.wrong("The price of the parameters is missing: `parameters * np.log(4 * n)`.")
+def parameters_for_nothing(distances, dimension, parameters, sigma):
+    return gric(distances, dimension, parameters, sigma) - parameters * np.log(4 * len(distances))
+
+
+@GRIC.wrong("The price of the dimension is missing: `dimension * n * np.log(4)`.")
+def dimension_for_nothing(distances, dimension, parameters, sigma):
+    return gric(distances, dimension, parameters, sigma) - dimension * len(distances) * np.log(4)
+
+
+@GRIC.wrong("This is the price of the freedom alone. What the pairs miss the model by comes first.")
+def price_alone(distances, dimension, parameters, sigma):
+    return _penalty(distances, dimension, parameters)
+
+
+@GRIC.wrong("These are decimal logarithms. `np.log` is the natural one.")
+def to_the_base_of_ten(distances, dimension, parameters, sigma):
+    residuals = np.minimum(distances**2 / sigma**2, 2 * (4 - dimension)).sum()
+    return residuals + _penalty(distances, dimension, parameters) / np.log(10)
+
+
+@GRIC.wrong("This is a mean over the pairs. A sum is wanted: its balance with the prices depends on n.")
+def the_mean_of_the_pairs(distances, dimension, parameters, sigma):
+    residuals = np.minimum(distances**2 / sigma**2, 2 * (4 - dimension)).mean()
+    return residuals + _penalty(distances, dimension, parameters)
+
+
+@GRIC.wrong("D and k have changed places: D is paid n times, k once.")
+def dimension_and_parameters_swapped(distances, dimension, parameters, sigma):
+    residuals = np.minimum(distances**2 / sigma**2, 2 * (4 - dimension)).sum()
+    return residuals + _penalty(distances, parameters, dimension)
+
+
+EXERCISES = (FUNDAMENTAL, LINE, EPIPOLE, EIGHT_POINT, IN_FRONT, SAMPSON, GRIC)
