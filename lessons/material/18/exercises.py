@@ -34,8 +34,8 @@ def meet(a: Array, b: Array, c: Array, d: Array) -> Array:
 
 
 def _lines(rng: np.random.Generator) -> Iterator[Arguments]:
-    for _ in range(4):
-        yield tuple(rng.uniform(-200, 800, (4, 2)))
+    for low in (-900, 0, 0):  # prolonged beyond the picture's corner, and in it
+        yield tuple(rng.uniform(low, low + 800, (4, 2)))
     a, c = rng.integers(0, 400, (2, 2)).astype(float)
     step = 2.0 ** rng.integers(4, 7, 2)
     p, q = rng.uniform(-100, 100, (2, 2))
@@ -151,15 +151,17 @@ def focal_length(first: Array, second: Array, centre: Array) -> Array:
 
 def _right_angles(rng: np.random.Generator) -> Iterator[Arguments]:
     for shape in SHAPES:
-        centre, f = rng.uniform(200, 500, 2), rng.uniform(300, 900, shape)
+        centre, f = rng.uniform(200, 500, 2) * (-2 if shape == (6,) else 1), rng.uniform(300, 900, shape)  # or cropped
         turn, height = rng.uniform(0.4, 1.1, shape), rng.uniform(-150, 150, shape)
         deep = np.hypot(f, height)
         first = centre + np.stack([deep * np.tan(turn), height], axis=-1)
         second = centre + np.stack([-deep / np.tan(turn), height], axis=-1)
         yield first, second, centre
-    centre = rng.uniform(200, 500, 2)
-    one = centre + rng.uniform(50, 300, 2)
-    yield np.array([one, one, one]), np.array([one + 40, [np.nan, np.nan], 2 * centre - one]), centre
+    centre = rng.integers(200, 500, 2).astype(float)
+    one = centre + rng.integers(50, 300, 2)
+    others = np.array([one + 40, [np.nan, np.nan], 2 * centre - one, centre, centre - (one - centre)[::-1] * (1, -1)])
+    yield np.broadcast_to(one, (5, 2)), others, centre  # an acute angle, none, a right one, and twice a product of 0
+    yield centre + (0.5, 0.25), centre - (0.5, 0.25), centre  # through a lens of half a pixel
 
 
 FOCAL_LENGTH = Exercise(
@@ -275,6 +277,7 @@ def height(foot: Array, top: Array, horizon: float, door_foot: float, door_top: 
 def _rows(rng: np.random.Generator) -> Iterator[Arguments]:
     for shape in SHAPES:
         f, horizon, eye = rng.uniform(400, 900), rng.uniform(200, 300), rng.uniform(1, 3)
+        horizon -= 1500 if shape == (6,) else 0  # above the picture, where someone has cropped it
         far, door_far = rng.uniform(3, 30, shape), rng.uniform(4, 8)
         foot, door_foot = horizon + f * eye / far, horizon + f * eye / door_far
         door_height = rng.uniform(1.5, 3.5)
@@ -390,6 +393,7 @@ def any_height(
 def _tilted(rng: np.random.Generator) -> Iterator[Arguments]:
     for number in range(5):
         K, R, _ = _camera(rng, tilt=25.0 if number else 0.0)
+        K[:2, 2] -= 3000 if number == 3 else 0  # cropped
         eye, tall, door = rng.uniform(1, 2.5), rng.uniform(0.4, 4), rng.uniform(1.5, 3)
         ahead = R[2] * (1, 0, 1) / np.hypot(R[2, 0], R[2, 2])
         aside = np.cross([0, 1, 0], ahead)
@@ -513,8 +517,9 @@ def principal_point(a: Array, b: Array, c: Array) -> Array:
 
 
 def _triangles(rng: np.random.Generator) -> Iterator[Arguments]:
-    for _ in range(5):
+    for number in range(5):
         K, R, _ = _camera(rng)
+        K[:2, 2] -= 9000 if number == 3 else 0  # cropped
         pitch = np.radians(rng.uniform(15, 35) * rng.choice([-1, 1]))
         tilt = np.array([[1, 0, 0], [0, np.cos(pitch), -np.sin(pitch)], [0, np.sin(pitch), np.cos(pitch)]])
         roll = np.radians(rng.uniform(5, 25))
@@ -622,6 +627,7 @@ def camera_matrix(points: Array, pixels: Array) -> Array:
 def _six_points(rng: np.random.Generator) -> Iterator[Arguments]:
     for n in (6, 6, 9, 20):
         K, R, _ = _camera(rng)
+        K[:2, 2] -= 1500 if n == 9 else 0  # cropped
         K[0, 1], K[1, 1] = rng.uniform(-20, 20), K[1, 1] * rng.uniform(0.8, 1.2)
         points = rng.uniform(-2, 2, (n, 3))
         x = (points - R.T @ [0.3, -0.4, -6.0] * rng.uniform(0.8, 1.2)) @ (K @ R).T
