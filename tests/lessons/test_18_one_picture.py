@@ -58,7 +58,7 @@ def test_a_vanishing_point_is_where_opencv_sees_the_edge_s_end_a_billion_metres_
     view = VanishingView(**state)
     for name, direction in (("x", (-1e9, 0, 0)), ("z", (0, 0, 1e9))):
         far = view.camera.centre + direction
-        np.testing.assert_allclose(view.pixel(name), by_opencv(view.camera, [far])[0], atol=1e-4)
+        np.testing.assert_allclose(view.pixels[name], by_opencv(view.camera, [far])[0], atol=1e-4)
     assert view.focal == pytest.approx(view.camera.intrinsics.fx, rel=1e-9)
     assert view.tilt == pytest.approx(state.get("tilt_deg", 0), abs=1e-7)
 
@@ -67,9 +67,9 @@ def test_k_from_vanishing_points_of_50_pictures_is_within_1_percent_and_nan_wher
     assert focal_errors(1.0).max() < 0.01
     right = exercise("18.focal_length").reference
     square = VanishingView(aside=-3.0, turn_deg=42.0)
-    assert np.isnan(square.pixel("x")).all()
+    assert np.isnan(square.pixels["x"]).all()
     assert np.isnan(square.focal)
-    assert np.isnan(right(square.pixel("x"), square.pixel("z"), np.array([319.5, 239.5])))
+    assert np.isnan(right(square.pixels["x"], square.pixels["z"], np.array([319.5, 239.5])))
     assert square.numbers()["focal length"] == "none: a point is at infinity"
 
 
@@ -256,8 +256,9 @@ def test_shapes_are_those_of_the_functions(says):
         "`foot`, `top`, `door_foot` and `door_top` are pixels (2,), `horizon` and `vertical` have three numbers."
     )
     view = StaffView()
-    assert view.horizon.shape == (line.value,)
-    assert view.vertical.shape == (upright.value,)
+    x, vertical, z = view._directions
+    assert np.cross(x, z).shape == (line.value,)
+    assert vertical.shape == (upright.value,)
     assert view.staff[0].shape == (foot.value,)
     (middle,) = says("Return p (2,) from the three vanishing points")
     (corner,) = says("from the three vanishing points `a`, `b` and `c` (2,).")

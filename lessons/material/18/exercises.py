@@ -416,7 +416,7 @@ ANY_HEIGHT = Exercise(
     hints=(
         "The equation gives camera heights up to a factor that is the same for staff and door. What do you divide?",
         "Write the right side as a function of one foot and top, each with a third number 1. Call it twice.",
-        "`np.linalg.norm(np.cross(b, t)) / ((horizon @ b) * np.linalg.norm(___))`",
+        "`return np.linalg.norm(np.cross(b, t)) / ((horizon @ b) * np.linalg.norm(___))`",
     ),
     praise="Neither K nor the tilt was needed: the horizon and one point hold both.",
 )
@@ -536,7 +536,7 @@ PRINCIPAL_POINT = Exercise(
     hints=(
         "The line from one corner through p stands at a right angle on the side opposite. Two such lines fix p.",
         "(a − p) · (b − c) = 0 says (b − c) · p = (b − c) · a. A second corner gives a second row: solve both for p.",
-        "`np.linalg.solve(np.array([b - c, c - a]), [(b - c) @ a, ___])`",
+        "`return np.linalg.solve(sides, [(b - c) @ a, ___])`, where `sides` has the rows b − c and c − a",
     ),
     praise="It is where the three heights of the triangle cross.",
 )

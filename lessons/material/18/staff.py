@@ -1,9 +1,4 @@
-"""The height visualizer: a staff on the lawn, the horizon, and what one known height tells of another.
-
-A reader's own function measures the staff.
-"""
-
-from __future__ import annotations
+"""The height visualizer: a staff on the lawn, the horizon, and a door of known height; a reader's function measures."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -15,18 +10,17 @@ import numpy as np
 from camviz.cameras import Camera
 from camviz.draw import svg
 from camviz.draw.flow import Cell, rows, shortened
-from camviz.draw.panel import Panel, image_panel, placed_image
+from camviz.draw.panel import image_panel, placed_image
 from camviz.draw.picture import Picture
 from camviz.draw.readout import decimal, listed, readout
 from camviz.lenses.base import Array
 from camviz.views import marks
-from camviz.views.base import View, positive, slider
-from camviz.views.garden import DRAFT, FINE
+from camviz.views.base import View, slider
 from camviz.views.yours import is_unwritten, tried
 from camviz_school.views.house import DOOR, DOOR_EDGE, EYE, HEIGHT, WIDTH, camera, photographed
 
-TURN_DEG, HFOV_DEG = 24.0, 66.0  # so that door, lamps and staff are seen
-X = 0.6  # of the staff, metres to the right of the camera
+_X = 0.6  # of the staff, metres to the right of the camera
+_PANEL = image_panel("picture", 45, 34, 530, WIDTH, HEIGHT)
 _WIDE = {"picture": 620, "numbers": 240}
 
 
@@ -34,10 +28,9 @@ _WIDE = {"picture": 620, "numbers": 240}
 class StaffView(View):
     """A staff of `staff_m` on level ground, `distance_m` in front of a camera that is `EYE` metres above the ground.
 
-    Its length is measured by the door, which is `DOOR` metres tall. `panels` names what is drawn: the picture, and
-    numbers. `yours` is a reader's function that measures the staff: of rows (foot, top, horizon, door_foot, door_top,
-    door_height), or, where `tilted`, of pixels (2,), a line and a point (3,): (foot, top, door_foot, door_top,
-    door_height, horizon, vertical).
+    `panels` names what is drawn: the picture, and perhaps numbers. `yours` is a reader's function that measures: of the
+    rows (foot, top, horizon, door_foot, door_top, door_height), or, where `tilted`, of pixels (2,), a line and a point
+    (3,): (foot, top, door_foot, door_top, door_height, horizon, vertical).
     """
 
     title: ClassVar[str] = "Heights"
@@ -52,20 +45,17 @@ class StaffView(View):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        positive(self, "distance_m", "staff_m")
         if "picture" not in (wanted := self.panels.split()) or not {*wanted} <= {*_WIDE}:
             raise ValueError(f"panels must be picture and perhaps numbers, got {self.panels!r}")
 
-    # What is true -----------------------------------------------------------------------------------------------------
-
     @cached_property
     def camera(self) -> Camera:
-        return camera(TURN_DEG, self.tilt_deg, HFOV_DEG)
+        return camera(24.0, self.tilt_deg, 66.0)  # so that door, lamps and staff are seen
 
     @cached_property
     def staff(self) -> Array:
         """Its foot and top (2, 2) in pixels."""
-        return self._seen([0.0, self.staff_m])
+        return self._above([0.0, self.staff_m])
 
     @cached_property
     def door(self) -> Array:
@@ -73,68 +63,50 @@ class StaffView(View):
         return self.camera.project(DOOR_EDGE)
 
     @cached_property
-    def horizon(self) -> Array:
-        """The line (3,) of all points of the picture that are as high as the camera: level directions."""
-        first, second = (self._image(direction) for direction in ((1.0, 0, 0), (0, 0, 1.0)))
-        return np.cross(first, second)
-
-    @cached_property
-    def vertical(self) -> Array:
-        """The point (3,) where upright lines meet; its last number is 0 for a level camera."""
-        return self._image((0, -1.0, 0))
-
-    def _image(self, direction: tuple[float, float, float]) -> Array:
-        R, _ = self.camera.extrinsics
-        return np.where(np.abs(found := self.camera.intrinsics.K @ R @ direction) < 1e-9, 0.0, found)
-
-    def _seen(self, above: list[float]) -> Array:
-        """Pixels (n, 2) of places so many metres above the staff's foot."""
-        y = EYE - np.asarray(above)
-        return self.camera.project(np.stack([np.full_like(y, X), y, np.full_like(y, self.distance_m)], axis=-1))
+    def _directions(self) -> Array:
+        """The points (3, 3) where lines along x, up and along z meet; w is 0 where these are parallel."""
+        found = (self.camera.intrinsics.K @ self.camera.extrinsics[0]).T * [[1], [-1], [1]]
+        return np.where(np.abs(found) < 1e-9, 0.0, found)
 
     @property
     def horizon_row(self) -> float:
-        """The horizon's row in the middle of the picture."""
-        a, b, c = self.horizon
-        return float(-(a * self.camera.intrinsics.cx + c) / b)
+        """The horizon's row, for this camera is not rolled."""
+        return float(self._directions[2, 1] / self._directions[2, 2])
+
+    def _above(self, metres: Any) -> Array:
+        """Pixels (n, 2) of places so many metres above the staff's foot."""
+        return self.camera.project([(_X, EYE - one, self.distance_m) for one in metres])
 
     def numbers(self) -> dict[str, str]:
         """The state's key figures, as text."""
-        (_, foot), (_, top) = self.staff
-        (_, low), (_, high) = self.door
-        figures = {
-            "foot of the staff": f"row {decimal(foot, 1)}",
-            "top of the staff": f"row {decimal(top, 1)}",
-            "horizon": f"row {self.horizon_row:.1f}",
-            "door's edge": f"rows {low:.1f} to {high:.1f}, {DOOR:g} m",
-        }
-        if self.yours is None:
-            return figures
-        answer, _ = self._answer
-        return figures | {"the staff, by yours": f"{decimal(answer, 2)} m" if np.isfinite(answer) else "–"}
+        found = {"foot of the staff": self.staff[0, 1], "top of the staff": self.staff[1, 1]}
+        found |= {"horizon": self.horizon_row, "foot of the door": self.door[0, 1], "top of the door": self.door[1, 1]}
+        figures = {name: f"row {decimal(row, 1)}" for name, row in found.items()}
+        return figures | ({"the staff, by yours": self._words or "–"} if self.yours else {})
 
     @cached_property
     def _answer(self) -> tuple[float, str]:
         """What the reader's function says, and what is wrong with it."""
-        (foot, top), (low, high) = self.staff, self.door
-        given = (foot[1], top[1], self.horizon_row, low[1], high[1], DOOR)
-        if self.tilted:
-            given = (foot, top, low, high, DOOR, self.horizon, self.vertical)
         assert self.yours
+        given = (*self.staff[:, 1], self.horizon_row, *self.door[:, 1], DOOR)
+        if self.tilted:
+            x, vertical, z = self._directions
+            given = (*self.staff, *self.door, DOOR, np.cross(x, z), vertical)
         answer, problem = tried(self.yours, given, self.staff_m)
         return float(answer), problem
+
+    @property
+    def _words(self) -> str:
+        return f"{decimal(self._answer[0], 2)} m" if self.yours and np.isfinite(self._answer[0]) else ""
 
     def description(self) -> str:
         stand = f"{self.distance_m:g} m away, in a picture tilted {decimal(self.tilt_deg, 1)}°"
         return f"A staff of {self.staff_m:g} m, {stand}: {listed(self.numbers())}."
 
-    # What it looks like -----------------------------------------------------------------------------------------------
-
     def figure(self, *, draft: bool = False) -> Picture:
-        _, photograph = photographed(self.camera, DRAFT if draft else FINE)
         draw = {"picture": self._picture_panel, "numbers": self._numbers_column}
         parts = {name: draw[name](cell) for name, cell in self._layout.items()}
-        return self.tiled(self._layout, parts, {"house": photograph})
+        return self.tiled(self._layout, parts, {"house": photographed(self.camera, draft)})
 
     @cached_property
     def _layout(self) -> dict[str, Cell]:
@@ -142,34 +114,24 @@ class StaffView(View):
         return shortened(rows((high["picture"], {name: w for name, w in _WIDE.items() if self._has(name)})), **high)
 
     def _picture_panel(self, cell: Cell) -> str:
-        panel = image_panel("picture", 45, 34, 530, WIDTH, HEIGHT)
-        a, b, c = self.horizon
-        u = np.array([panel.left, panel.right])
-        line = panel.place(np.stack([u, -(a * u + c) / b], axis=-1))
-        content = placed_image(panel, "house", WIDTH, HEIGHT) + marks.on_photograph([line], "yellow dashed")
-        content += svg.text(line[0] + (8, -8), "horizon", "label halo")
-        content += self._measured(panel, self.door, "green", f"{DOOR:g} m")
-        words, problem = "", ""
-        if self.yours:
-            answer, problem = self._answer
-            words = f"yours: {decimal(answer, 2)} m" if np.isfinite(answer) else ""
-        content += self._measured(panel, self.staff, "orange", words) + self._half_metres(panel)
+        line = _PANEL.place([(_PANEL.left, self.horizon_row), (_PANEL.right, self.horizon_row)])
+        content = placed_image(_PANEL, "house", WIDTH, HEIGHT) + marks.on_photograph([line], "yellow dashed")
+        content += svg.text(line[0] + (8, -8), "horizon", "label halo") + _measured(self.door, "green", f"{DOOR:g} m")
+        content += _measured(self.staff, "orange", self._words and f"yours: {self._words}")
+        at, half = _PANEL.place(self._above(np.arange(0.5, self.staff_m + 0.01, 0.5))), np.array([5.0, 0.0])
+        content += "".join(svg.segments(at - half, at + half, class_) for class_ in ("paper-line", "ink"))
+        problem = self._answer[1] if self.yours else ""
         said = "yours appears here, beside the staff" if is_unwritten(problem) else problem
-        shown = panel.show(content, title=f"A staff of {self.staff_m:g} m, {self.distance_m:g} m away")
-        return shown + svg.paragraph((49, panel.y + panel.height + 22), said, panel.width - 10)
-
-    def _measured(self, panel: Panel, ends: Array, colour: str, words: str) -> str:
-        """A line from foot to top with a dot at either end, and words on its right."""
-        at = panel.place(ends)
-        name = svg.text(np.clip(at.mean(axis=0) + (10, 26), 16, panel.height - 10), words, "label halo")
-        return marks.on_photograph([at], f"{colour} thick") + svg.dots(at, colour, 9) + name
-
-    def _half_metres(self, panel: Panel) -> str:
-        """Marks across the staff, one for each half metre."""
-        at = panel.place(self._seen(np.arange(0.5, self.staff_m + 0.01, 0.5).tolist()))
-        half = np.array([5.0, 0.0])
-        return svg.segments(at - half, at + half, "paper-line") + svg.segments(at - half, at + half, "ink")
+        shown = _PANEL.show(content, title=f"A staff of {self.staff_m:g} m, {self.distance_m:g} m away")
+        return shown + svg.paragraph((49, _PANEL.y + _PANEL.height + 22), said, _PANEL.width - 10)
 
     def _numbers_column(self, cell: Cell) -> str:
         column = readout(self.numbers(), (cell[0] + 10, 54), (0, 40), (0, 17))
         return svg.text((cell[0] + 10, 26), "Measured in the picture", "title") + column
+
+
+def _measured(ends: Array, colour: str, words: str) -> str:
+    """A line from foot to top (2, 2) in pixels with a dot at either end, and words on its right."""
+    at = _PANEL.place(ends)
+    name = svg.text(np.clip(at.mean(axis=0) + (10, 26), 16, _PANEL.height - 10), words, "label halo")
+    return marks.on_photograph([at], f"{colour} thick") + svg.dots(at, colour, 9) + name
