@@ -117,7 +117,7 @@ class StaffView(View):
         line = _PANEL.place([(_PANEL.left, self.horizon_row), (_PANEL.right, self.horizon_row)])
         content = placed_image(_PANEL, "house", WIDTH, HEIGHT) + marks.on_photograph([line], "yellow dashed")
         content += svg.text(line[0] + (8, -8), "horizon", "label halo") + _measured(self.door, "green", f"{DOOR:g} m")
-        content += _measured(self.staff, "orange", self._words and f"yours: {self._words}")
+        content += _measured(self.staff, "purple", self._words and f"yours: {self._words}", "orange")
         at, half = _PANEL.place(self._above(np.arange(0.5, self.staff_m + 0.01, 0.5))), np.array([5.0, 0.0])
         content += "".join(svg.segments(at - half, at + half, class_) for class_ in ("paper-line", "ink"))
         problem = self._answer[1] if self.yours else ""
@@ -130,8 +130,8 @@ class StaffView(View):
         return svg.text((cell[0] + 10, 26), "Measured in the picture", "title") + column
 
 
-def _measured(ends: Array, colour: str, words: str) -> str:
+def _measured(ends: Array, colour: str, words: str, class_: str = "label") -> str:
     """A line from foot to top (2, 2) in pixels with a dot at either end, and words on its right."""
     at = _PANEL.place(ends)
-    name = svg.text(np.clip(at.mean(axis=0) + (10, 26), 16, _PANEL.height - 10), words, "label halo")
+    name = svg.text(np.clip(at.mean(axis=0) + (10, 26), 16, _PANEL.height - 10), words, f"{class_} halo")
     return marks.on_photograph([at], f"{colour} thick") + svg.dots(at, colour, 9) + name
