@@ -12,7 +12,7 @@ import numpy as np
 
 from camviz.cameras import Camera
 from camviz.draw import svg
-from camviz.draw.flow import Cell, rows, shortened
+from camviz.draw.flow import Cell
 from camviz.draw.panel import Panel, placed_image
 from camviz.draw.picture import Picture
 from camviz.draw.readout import decimal, listed, readout
@@ -22,11 +22,11 @@ from camviz.views.base import View, slider, switch
 from camviz.views.yours import is_unwritten, tried
 from camviz_school.views.house import HEIGHT, WIDTH, camera, edges, photographed
 
-PAPER = Panel("paper", 10, 34, 680, 364, -380, 1020, -130, 620)
+PAPER = Panel("paper", 10, 34, 600, 258, -380, 1020, -61, 541)
 """The paper, in pixels of the photograph."""
 FAR = 1e5
 """Pixels from the middle beyond which a point counts as lying at infinity: two lines then part by 1/200 of a pixel."""
-_WIDE = {"paper": 700, "above": 260, "numbers": 260}
+_PANELS = "paper", "above", "numbers"
 _COLOURS = {"x": "blue", "z": "purple", "up": "green"}
 
 
@@ -48,13 +48,13 @@ class VanishingView(View):
     aside: float = slider(0.0, -3.0, 2.0, 0.1, label="step aside", unit="m", help="of the camera, to the right")
     upright: bool = switch(False, label="upright lines", help="lines along two upright edges, too")
     moved: tuple[tuple[float, float], ...] = ((0.0, 0.0),) * 8
-    panels: str = " ".join(_WIDE)
+    panels: str = " ".join(_PANELS)
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if "paper" not in (wanted := self.panels.split()) or not {*wanted} <= {*_WIDE}:
-            raise ValueError(f"panels must be paper and any of {', '.join([*_WIDE][1:])}, got {self.panels!r}")
+        if "paper" not in (wanted := self.panels.split()) or not {*wanted} <= {*_PANELS}:
+            raise ValueError(f"panels must be paper and any of {', '.join(_PANELS[1:])}, got {self.panels!r}")
         if np.shape(self.moved) != (8, 2) or not np.isfinite(self.moved).all():
             raise ValueError("moved must be 8 pairs of finite numbers, one for each end of the four lines")
 
@@ -128,10 +128,13 @@ class VanishingView(View):
 
     @cached_property
     def _layout(self) -> dict[str, Cell]:
-        both = self._has("above") and self._has("numbers")
-        high = {"paper": 418 + 44 * bool(self.yours), "above": 300, "numbers": 126 if both else 286}
-        first = {name: wide for name, wide in _WIDE.items() if self._has(name) and not (both and name == "numbers")}
-        return shortened(rows((high["paper"], first), *[(126, {"numbers": 600})] * both), **high)
+        """The paper, and on its right whatever else is drawn, one below the other."""
+        high = {"paper": 310 + 30 * bool(self.yours), "above": 300, "numbers": 286}
+        found, top = {"paper": (0.0, 0.0, 620.0, float(high["paper"]))}, 0.0
+        for name in filter(self._has, ("above", "numbers")):
+            found[name] = 640.0, top, 260.0, float(high[name])
+            top += high[name]
+        return found
 
     def _paper_panel(self, cell: Cell) -> str:
         beyond, right = self._beyond()
@@ -140,7 +143,7 @@ class VanishingView(View):
         content += "".join(map(self._prolonged, self.lines)) + beyond + yours + "".join(map(self._handle, range(8)))
         words = "yours appears here, as orange rings" if is_unwritten(problem) else problem
         shown = PAPER.show(content, title="The photograph on a sheet of paper", hint="drag the small dots")
-        return shown + svg.paragraph((14, PAPER.y + PAPER.height + 22), words, PAPER.width - 10)
+        return shown + svg.paragraph((14, PAPER.y + PAPER.height + 20), words, PAPER.width - 10)
 
     def _horizon_line(self, right: bool) -> str:
         row, slope = self.horizon
@@ -217,12 +220,9 @@ class VanishingView(View):
         return shown + svg.text((x + 14, panel.y + panel.height + 17), "black: the picture; colours: the walls", "note")
 
     def _numbers_column(self, cell: Cell) -> str:
-        """One below the other beside the paper, in two rows below it."""
         x, y, _, _ = cell
-        figures = [*self.numbers().items()]
-        parts = [(figures, (0, 40))] if x else [(figures[:3], (190, 0)), (figures[3:], (190, 0))]
-        drawn = [readout(some, (x + 10, y + 54 + 42 * row), step, (0, 17)) for row, (some, step) in enumerate(parts)]
-        return svg.text((x + 10, y + 26), "From these lines", "title") + "".join(drawn)
+        column = readout(self.numbers(), (x + 10, y + 54), (0, 40), (0, 17))
+        return svg.text((x + 10, y + 26), "From these lines", "title") + column
 
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> "VanishingView":
         """The end of a line follows the pointer."""
