@@ -7,7 +7,11 @@ import nbformat
 import pytest
 from house import ROOT, house
 
-PAGE = (ROOT / "docs/recipes.md").read_text(encoding="utf-8")
+TAKEN = [path.name[:2] for path in sorted((ROOT / "lessons").glob("[0-9][0-9]_*.ipynb"))]
+FREE = f"{int(TAKEN[-1]) + 1:02}"
+"""The number that the trial's lesson takes, whatever number the page gives it."""
+
+PAGE = re.sub(r"(?<!\d)20(?!\d)", FREE, (ROOT / "docs/recipes.md").read_text(encoding="utf-8"))
 EXAMPLE = re.compile(r"^`(?P<path>[^`\n]+)`\n(?P<fence>`{3,})\w*\n(?P<text>.*?)^(?P=fence)$", re.MULTILINE | re.DOTALL)
 EXAMPLES = {found["path"]: found["text"] for found in EXAMPLE.finditer(PAGE)}
 CELL = re.compile(r"^# %%(?P<words>.*)$", re.MULTILINE)
@@ -47,31 +51,34 @@ def lesson(tmp_path_factory):
 
 def test_a_lesson_is_a_notebook_and_its_folder():
     written = example("lessons/")
-    assert {re.match(r"lessons/(material/\d+|.*)", path)[1] for path in written} == {"18_shadows.ipynb", "material/18"}
+    assert {re.match(r"lessons/(material/\d+|.*)", path)[1] for path in written} == {
+        f"{FREE}_shadows.ipynb",
+        f"material/{FREE}",
+    }
 
 
 def test_the_pages_list_the_lesson_in_its_place_and_nothing_else_is_written(lesson):
     made = {"README.md", "docs/glossary.md", "lessons/00_start_here.ipynb"}
     assert lesson.touched() == {*made, *example("lessons/")}
     readme = lesson.text("README.md")
-    assert "| **[18 Shadows](lessons/18_shadows.ipynb)** |" in readme
+    assert f"| **[{FREE} Shadows](lessons/{FREE}_shadows.ipynb)** |" in readme
     row = "How tall is a tree that you cannot climb? | the sun measures every tree at once | a tree of your own | 10 |"
-    assert f"| 18 Shadows | {row}" in readme
+    assert f"| {FREE} Shadows | {row}" in readme
     start = "".join(one.source for one in nbformat.reads(lesson.text("lessons/00_start_here.ipynb"), 4).cells)
-    assert "| 18 | [Shadows](18_shadows.ipynb) | How tall is a tree that you cannot climb? | 10 |" in start
+    assert f"| {FREE} | [Shadows]({FREE}_shadows.ipynb) | How tall is a tree that you cannot climb? | 10 |" in start
     for page, way in ((readme, r"^\| (\d\d) "), (start, r"^\| (\d\d) \|")):
         order = re.findall(way, page, re.MULTILINE)
-        assert order[-2:] == ["17", "18"]
+        assert order[-2:] == [TAKEN[-1], FREE]
     assert '<a id="gnomon"></a>**Gnomon.** An upright stick' in start
-    assert "*Lesson [18](../lessons/18_shadows.ipynb).*" in lesson.text("docs/glossary.md")
+    assert f"*Lesson [{FREE}](../lessons/{FREE}_shadows.ipynb).*" in lesson.text("docs/glossary.md")
 
 
 def test_the_check_of_the_lesson_finds_nothing_wrong_and_says_what_is_still_lacking(lesson):
-    said = lesson.run("-m", "camviz_school.commands.lessons", "check", "18", status=1)
+    said = lesson.run("-m", "camviz_school.commands.lessons", "check", FREE, status=1)
     assert {line.partition(": ")[2] for line in said.splitlines()} == {
         "no cell is tagged nbval-check-output, so no number of this lesson is held",
         "at least two predict questions are wanted, 1 are asked",
-        'the lesson must end with one quiz("18"), has []',
+        f'the lesson must end with one quiz("{FREE}"), has []',
         "three to five exercises are wanted, there are 1",
         "one exercise should be to find a bug",
         "at least two of the reader's functions must run in the lesson, [] do",
@@ -93,29 +100,29 @@ from camviz_school.course import notebooks
 from camviz_school.course.exercises import Tutor, exercise
 from camviz_school.course.questions import question
 
-lesson = notebooks.read(Path("lessons/18_shadows.ipynb"))
-wrong = exercise("18.height").misconceptions[0].function
+lesson = notebooks.read(Path("lessons/NN_shadows.ipynb"))
+wrong = exercise("NN.height").misconceptions[0].function
 print(json.dumps({
-    "question": question("18.stick").choices[1].misconception,
-    "stub": notebooks.verdicts(lesson, solved=False)["18.height"].status,
-    "solution": notebooks.verdicts(lesson, solved=True)["18.height"].status,
-    "right": [Tutor()("18.height", way).status for way in exercise("18.height").right_ways],
-    "wrong": Tutor()("18.height", wrong).message,
+    "question": question("NN.stick").choices[1].misconception,
+    "stub": notebooks.verdicts(lesson, solved=False)["NN.height"].status,
+    "solution": notebooks.verdicts(lesson, solved=True)["NN.height"].status,
+    "right": [Tutor()("NN.height", way).status for way in exercise("NN.height").right_ways],
+    "wrong": Tutor()("NN.height", wrong).message,
 }))
 """
-    said = json.loads(lesson.run("-c", code))
+    said = json.loads(lesson.run("-c", code.replace("NN", FREE)))
     assert said["question"] == "the proportion is upside down"
     assert (said["stub"], said["solution"], said["right"]) == ("unsolved", "correct", ["correct"])
     assert said["wrong"].startswith("The proportion is upside down.")
 
 
 def test_a_teacher_gets_the_lesson_with_its_key_its_solution_and_its_sheets(lesson, tmp_path):
-    lesson.run("-m", "camviz", "teacher", str(tmp_path / "out"), "--no-run", "--slides", "--lesson", "18")
-    edition = (tmp_path / "out" / "18_shadows.ipynb").read_text(encoding="utf-8")
+    lesson.run("-m", "camviz", "teacher", str(tmp_path / "out"), "--no-run", "--slides", "--lesson", FREE)
+    edition = (tmp_path / "out" / f"{FREE}_shadows.ipynb").read_text(encoding="utf-8")
     assert "Right is **(a)** 6 m" in edition
     assert "### BEGIN SOLUTION" in edition
-    pages = {path.name: path.read_text(encoding="utf-8") for path in (tmp_path / "out").glob("18_*.html")}
-    assert set(pages) == {"18_exercises.html", "18_marking.html", "18_slides.html"}
+    pages = {path.name: path.read_text(encoding="utf-8") for path in (tmp_path / "out").glob(f"{FREE}_*.html")}
+    assert set(pages) == {f"{FREE}_{name}.html" for name in ("exercises", "marking", "slides")}
     assert "upside down" in pages["18_marking.html"]
     assert all("Shadows" in page for page in pages.values())
 

@@ -21,6 +21,7 @@ from camviz_school.views.pinhole import PinholeView
 from camviz_school.views.readout import ReadoutView
 from camviz_school.views.rectification import RectificationView
 from camviz_school.views.sharpness import SharpnessView
+from camviz_school.views.vanishing import VanishingView
 
 # The left camera of OpenCV's samples/data/intrinsics.yml
 PUBLISHED = Camera(
@@ -45,6 +46,7 @@ PICTURES = {
     "noise": PhotonTransferView(exposure=-8.0, dark_current=0.0, panels="picture curve"),
     "omnidirectional": OmnidirectionalView(panels="doughnut window", hfov_deg=80.0),
     "sharpness": SharpnessView(f_number=2.8, defocus_um=20.0),
+    "one_picture": VanishingView(panels="paper"),
     "fault_lab": FaultLabView(fault="column off", strength=0.5, seed=5).worst(),
 }
 
