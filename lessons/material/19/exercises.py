@@ -33,6 +33,7 @@ def _carried(rng: np.random.Generator) -> Iterator[Arguments]:
         yield _homography(rng), rng.uniform(20, 620, (*shape, 2))
     yield rng.uniform(2, 3) * _homography(rng), rng.uniform(20, 620, (5, 2))  # no scale of H matters
     yield -_homography(rng), rng.uniform(20, 620, (2, 2))
+    yield _homography(rng), rng.uniform(-700, -400, (4, 2)) * (1, -1) ** np.arange(4)[:, None]  # beside the picture
 
 
 def carry_as_given(H, uv):
@@ -140,11 +141,13 @@ def homography(uv: Array, to: Array) -> Array:
 
 
 def _matched(rng: np.random.Generator) -> Iterator[Arguments]:
-    for n in (12, 4, 30, 5):
+    for n, middle in ((12, 0), (4, 0), (30, 0), (5, 0), (10, 320)):  # at last around (0, 0), as on a mosaic's canvas
         H = _homography(rng)
         corners = np.array([[40.0, 60], [600, 30], [560, 430], [70, 400]]) + rng.uniform(-25, 25, (4, 2))
-        uv = np.concatenate([corners, rng.uniform(20, 450, (n - 4, 2))])
-        yield uv, carry(H, uv)
+        uv = np.concatenate([corners, rng.uniform(20, 450, (n - 4, 2))]) - middle
+        to = carry(H, uv)
+        to = to - to.mean(axis=0) * bool(middle)
+        yield uv, to
 
 
 HOMOGRAPHY = Exercise(
@@ -286,7 +289,8 @@ def _steps(rng: np.random.Generator) -> Iterator[Arguments]:
         seen = points @ R.T + s * d
         yield points, R, d, seen / np.linalg.norm(seen, axis=-1, keepdims=True)
     points, rays = rng.uniform((-2, -2, 4), (2, 2, 9), (8, 3)), rng.normal(size=(8, 3))
-    yield points, R, d, rays / np.linalg.norm(rays, axis=-1, keepdims=True)  # nothing fits: the sum of squares decides
+    rays = rays / np.linalg.norm(rays, axis=-1, keepdims=True)  # nothing fits: the sum of squares decides
+    yield points, R, -d if second_step(points, R, d, rays) > 0 else d, rays  # s < 0: the direction is turned round
 
 
 STEP = Exercise(
