@@ -633,8 +633,8 @@ ALIGNED = Exercise(
     tolerance=1e-7,
     hints=(
         "Take the middles away first. Then a rotation is left, and one scale.",
-        "`U, s, Vt = np.linalg.svd(b.T @ a)` gives the rotation U D Vᵀ. D is diag(1, 1, ±1), so that it is no mirror "
-        "image. The scale is the sum of s times D's signs, over the sum of the squares of a.",
+        "`np.linalg.svd` of Bᵀ A gives U, s and Vᵀ. The rotation is U D Vᵀ with D = diag(1, 1, ±1), so that it is no "
+        "mirror image. The scale is the sum of s times D's signs, over the sum of the squares of a.",
         "`scale = np.sum(s * sign) / ___`",
     ),
     praise="Three numbers of place, three of rotation and one of scale: pictures leave these seven free.",

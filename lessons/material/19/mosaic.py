@@ -29,14 +29,13 @@ from camviz.views.base import View, choice, slider, switch
 from camviz.views.marks import on_photograph
 from camviz.views.yours import YOURS_HERE, is_unwritten, tried
 
-LEFT, TOP, ACROSS, DOWN = -20, -150, 1330, 780
+LEFT, TOP, ACROSS, DOWN = -20, -110, 1330, 700
 """The mosaic's canvas, in pixels of the first picture's plane."""
 AGREES = 3.0  # px: a match that is farther off is wrong for RANSAC
-WALL_Z = 6.5
 _FIRST = RigidTransform.from_rotation(Rotation.from_euler("Y", -8, degrees=True))
 _CAMERA = Camera(Intrinsics.from_fov(640, 480, 50))
 _TRIED, _MOST = 300, 80  # landmarks, and matches
-_HIGH = {"mosaic": 442, "first": 360, "second": 360, "numbers": 230}
+_HIGH = {"mosaic": 318, "first": 360, "second": 360, "numbers": 230}
 
 
 @dataclass(frozen=True)
@@ -62,6 +61,7 @@ class MosaicView(View):
     )
     robust: bool = switch(True, label="RANSAC", help="sort out the wrong matches first")
     panels: str = "mosaic pictures matches numbers"
+    first: ClassVar[Camera] = _CAMERA.at(_FIRST)
     yours: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -70,11 +70,6 @@ class MosaicView(View):
             raise ValueError(f"panels must be mosaic and any of {', '.join(self.openable)}, got {self.panels!r}")
 
     # The geometry ----------------------------------------------------------------------------------------------------
-
-    @property
-    def first(self) -> Camera:
-        """The first camera, at the origin."""
-        return _CAMERA.at(_FIRST)
 
     @cached_property
     def second(self) -> Camera:
@@ -103,7 +98,7 @@ class MosaicView(View):
     def used(self) -> Array:
         """Which of the matches (n,) H is estimated from."""
         points = self.exact[0]
-        on = {"wall": np.abs(points[:, 2] - WALL_Z) < 0.04, "floor": np.abs(points[:, 1] - FLOOR) < 0.02}
+        on = {"wall": np.abs(points[:, 2] - 6.5) < 0.04, "floor": np.abs(points[:, 1] - FLOOR) < 0.02}
         chosen = on.get(self.fit, np.ones(len(points), dtype=bool))
         if self.robust and self.wrong and chosen.sum() >= 4:
             uv, to = (part[chosen] for part in self.matches)
@@ -121,22 +116,18 @@ class MosaicView(View):
             return np.full((3, 3), np.nan)
 
     @cached_property
-    def your_H(self) -> tuple[Array, str]:
-        """The H (3, 3) of the reader's function, and what is wrong with it."""
-        assert self.yours is not None
-        return tried(self.yours, tuple(part[self.used] for part in self.matches), np.eye(3))
-
-    @property
-    def _shown_H(self) -> Array:
-        if self.yours is None or is_unwritten(self.your_H[1]):
-            return self.H
-        return self.your_H[0]
+    def shown_H(self) -> tuple[Array, str]:
+        """The H (3, 3) of the reader's function, and what is wrong with it; the right one where there is none yet."""
+        if self.yours is None:
+            return self.H, ""
+        answer, problem = tried(self.yours, tuple(part[self.used] for part in self.matches), np.eye(3))
+        return (self.H if is_unwritten(problem) else answer), problem
 
     @cached_property
     def miss(self) -> Array:
         """How far (n,) each true pixel of the second picture comes to lie from its partner in the first, in pixels."""
         _, uv, to = self.exact
-        return np.linalg.norm(warped(self._shown_H, uv) - to, axis=-1)
+        return np.linalg.norm(warped(self.shown_H[0], uv) - to, axis=-1)
 
     def numbers(self) -> dict[str, str]:
         """The state's key figures, as text."""
@@ -160,7 +151,7 @@ class MosaicView(View):
         size = round(ACROSS * scale), round(DOWN * scale)
         small = np.array([[scale, 0, (scale - 1) / 2], [0, scale, (scale - 1) / 2], [0, 0, 1]])
         to_canvas = np.array([[1.0, 0, -LEFT], [0, 1, -TOP], [0, 0, 1]])
-        H = self._shown_H if np.isfinite(self._shown_H).all() else np.zeros((3, 3))
+        H = np.nan_to_num(self.shown_H[0])
         made, weight = np.zeros((size[1], size[0], 3), np.float32), np.zeros((size[1], size[0]), np.float32)
         for image, matrix in ((first, np.eye(3)), (second, H)):
             if matrix.any():
@@ -192,15 +183,15 @@ class MosaicView(View):
 
     @cached_property
     def _layout(self) -> dict[str, Cell]:
-        top = {"mosaic": 720.0} | ({"numbers": 240.0} if self._has("numbers") else {})
+        top = {"mosaic": 540.0} | ({"numbers": 240.0} if self._has("numbers") else {})
         below = {"first": 480.0, "second": 480.0} if self._has("pictures") else {}
         return shortened(rows((_HIGH["mosaic"], top), (_HIGH["first"], below)), **_HIGH)
 
     def _mosaic(self) -> str:
-        panel = Panel("mosaic", 10, 34, 680, 680 * DOWN / ACROSS, LEFT, LEFT + ACROSS, TOP, TOP + DOWN)
+        panel = Panel("mosaic", 10, 34, 520, 520 * DOWN / ACROSS, LEFT, LEFT + ACROSS, TOP, TOP + DOWN)
         content = svg.image("mosaic", 0, 0, panel.width, panel.height)
         content += self._marks(panel) if self._has("matches") else ""
-        problem = self.your_H[1] if self.yours else ""
+        problem = self.shown_H[1]
         content = svg.group(content, class_="awaited") if is_unwritten(problem) else content
         content += notice(panel, problem)
         return panel.show(content, title=f"Both pictures, joined by {'your' if self.yours else 'one'} H")
@@ -208,7 +199,7 @@ class MosaicView(View):
     def _marks(self, panel: Panel) -> str:
         """A dot where the first picture has a match, and a line to where the second one's pixel comes to lie."""
         uv, to = self.matches
-        ends = np.stack([panel.place(to), panel.place(warped(self._shown_H, uv))], axis=1)
+        ends = np.stack([panel.place(to), panel.place(warped(self.shown_H[0], uv))], axis=1)
         far = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1) > 1.5
         off = on_photograph(ends[far], "red") if far.any() else ""
         kept = ends[self.used, 0]
@@ -222,10 +213,8 @@ def _pixels(length: float) -> str:
 
 
 def warped(H: Array, uv: Array) -> Array:
-    """Where the homography takes pixels (..., 2)."""
-    x = np.concatenate([uv, np.ones_like(uv[..., :1])], axis=-1) @ H.T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return x[..., :2] / x[..., 2:]
+    """Where the homography takes pixels (n, 2)."""
+    return np.asarray(cv2.perspectiveTransform(uv[:, None], H)[:, 0])
 
 
 def notice(panel: Panel, problem: str) -> str:

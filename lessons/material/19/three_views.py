@@ -88,7 +88,7 @@ class ThreeViews(OrbitView):
         """The poses cam_from_first of the three cameras and the points (n, 3), in first steps."""
         first, second = true_scene().pairs
         found = STEPS[1] / STEPS[0] if self._waits else self.your_length[0] if self.yours else self.length
-        step = RigidTransform.from_components(np.nan_to_num(found) * second.translation, second.rotation)
+        step = RigidTransform.from_components(np.clip(np.nan_to_num(found), -100, 100) * second.translation, second.rotation)
         return (RigidTransform.identity(), first, step * first), transform(first.inv(), self.given[0])
 
     @cached_property
@@ -125,7 +125,7 @@ class ThreeViews(OrbitView):
     @cached_property
     def _layout(self) -> dict[str, Cell]:
         shown = [name for name in _WIDE if self._has(name)]
-        across = _THREE if len(shown) == 3 else _WIDE
+        across = {1: {"picture": 400.0}, 2: _WIDE, 3: _THREE}[len(shown)]
         high = 44 + 0.75 * (across["picture"] - 20)
         return shortened(rows((max(high, 370), {name: across[name] for name in shown})), picture=high, space=high)
 
