@@ -88,7 +88,8 @@ class ThreeViews(OrbitView):
         """The poses cam_from_first of the three cameras and the points (n, 3), in first steps."""
         first, second = true_scene().pairs
         found = STEPS[1] / STEPS[0] if self._waits else self.your_length[0] if self.yours else self.length
-        step = RigidTransform.from_components(np.clip(np.nan_to_num(found), -100, 100) * second.translation, second.rotation)
+        length = np.clip(np.nan_to_num(found), -100, 100)
+        step = RigidTransform.from_components(length * second.translation, second.rotation)
         return (RigidTransform.identity(), first, step * first), transform(first.inv(), self.given[0])
 
     @cached_property
