@@ -220,7 +220,7 @@ def test_few_modules_elsewhere_serve_one_lesson_alone() -> None:
 def test_the_modules_beside_the_lessons_are_short() -> None:
     lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in VIEWS.values()}
     assert [path for path, lines in lengths.items() if lines > 400] == []
-    assert sum(lengths.values()) <= 9250
+    assert sum(lengths.values()) <= 9700
 
 
 def test_the_modules_beside_the_lessons_have_names_of_their_own() -> None:

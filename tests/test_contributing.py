@@ -7,11 +7,11 @@ import nbformat
 import pytest
 from house import ROOT, house
 
-TAKEN = [path.name[:2] for path in sorted((ROOT / "lessons").glob("[0-9][0-9]_*.ipynb"))]
-FREE = f"{int(TAKEN[-1]) + 1:02}"
-"""The number that the trial's lesson takes, whatever number the page gives it."""
-
-PAGE = re.sub(r"(?<!\d)20(?!\d)", FREE, (ROOT / "docs/recipes.md").read_text(encoding="utf-8"))
+NUMBER = f"{1 + max(int(path.name[:2]) for path in (ROOT / 'lessons').glob('[0-9][0-9]_*.ipynb'))}"
+"""The next free one: the page may name one that has been taken since."""
+WRITTEN = (ROOT / "docs/recipes.md").read_text(encoding="utf-8")
+(NAMED,) = re.findall(r"^`lessons/material/(\d\d)/lesson.toml`$", WRITTEN, re.MULTILINE)
+PAGE = re.sub(rf"(?<!\d){NAMED}(?!\d)", NUMBER, WRITTEN)
 EXAMPLE = re.compile(r"^`(?P<path>[^`\n]+)`\n(?P<fence>`{3,})\w*\n(?P<text>.*?)^(?P=fence)$", re.MULTILINE | re.DOTALL)
 EXAMPLES = {found["path"]: found["text"] for found in EXAMPLE.finditer(PAGE)}
 CELL = re.compile(r"^# %%(?P<words>.*)$", re.MULTILINE)
@@ -51,34 +51,31 @@ def lesson(tmp_path_factory):
 
 def test_a_lesson_is_a_notebook_and_its_folder():
     written = example("lessons/")
-    assert {re.match(r"lessons/(material/\d+|.*)", path)[1] for path in written} == {
-        f"{FREE}_shadows.ipynb",
-        f"material/{FREE}",
-    }
+    assert {re.match(r"lessons/(material/\d+|.*)", path)[1] for path in written} == {"18_shadows.ipynb", "material/18"}
 
 
 def test_the_pages_list_the_lesson_in_its_place_and_nothing_else_is_written(lesson):
     made = {"README.md", "docs/glossary.md", "lessons/00_start_here.ipynb"}
     assert lesson.touched() == {*made, *example("lessons/")}
     readme = lesson.text("README.md")
-    assert f"| **[{FREE} Shadows](lessons/{FREE}_shadows.ipynb)** |" in readme
+    assert f"| **[{NUMBER} Shadows](lessons/{NUMBER}_shadows.ipynb)** |" in readme
     row = "How tall is a tree that you cannot climb? | the sun measures every tree at once | a tree of your own | 10 |"
-    assert f"| {FREE} Shadows | {row}" in readme
+    assert f"| {NUMBER} Shadows | {row}" in readme
     start = "".join(one.source for one in nbformat.reads(lesson.text("lessons/00_start_here.ipynb"), 4).cells)
-    assert f"| {FREE} | [Shadows]({FREE}_shadows.ipynb) | How tall is a tree that you cannot climb? | 10 |" in start
+    assert f"| {NUMBER} | [Shadows]({NUMBER}_shadows.ipynb) | How tall is a tree that you cannot climb? | 10 |" in start
     for page, way in ((readme, r"^\| (\d\d) "), (start, r"^\| (\d\d) \|")):
         order = re.findall(way, page, re.MULTILINE)
-        assert order[-2:] == [TAKEN[-1], FREE]
+        assert order[-2:] == [f"{int(NUMBER) - 1}", NUMBER]
     assert '<a id="gnomon"></a>**Gnomon.** An upright stick' in start
-    assert f"*Lesson [{FREE}](../lessons/{FREE}_shadows.ipynb).*" in lesson.text("docs/glossary.md")
+    assert f"*Lesson [{NUMBER}](../lessons/{NUMBER}_shadows.ipynb).*" in lesson.text("docs/glossary.md")
 
 
 def test_the_check_of_the_lesson_finds_nothing_wrong_and_says_what_is_still_lacking(lesson):
-    said = lesson.run("-m", "camviz_school.commands.lessons", "check", FREE, status=1)
+    said = lesson.run("-m", "camviz_school.commands.lessons", "check", NUMBER, status=1)
     assert {line.partition(": ")[2] for line in said.splitlines()} == {
         "no cell is tagged nbval-check-output, so no number of this lesson is held",
         "at least two predict questions are wanted, 1 are asked",
-        f'the lesson must end with one quiz("{FREE}"), has []',
+        f'the lesson must end with one quiz("{NUMBER}"), has []',
         "three to five exercises are wanted, there are 1",
         "one exercise should be to find a bug",
         "at least two of the reader's functions must run in the lesson, [] do",
@@ -109,21 +106,21 @@ print(json.dumps({
     "right": [Tutor()("NN.height", way).status for way in exercise("NN.height").right_ways],
     "wrong": Tutor()("NN.height", wrong).message,
 }))
-"""
-    said = json.loads(lesson.run("-c", code.replace("NN", FREE)))
+""".replace("NN", NUMBER)
+    said = json.loads(lesson.run("-c", code))
     assert said["question"] == "the proportion is upside down"
     assert (said["stub"], said["solution"], said["right"]) == ("unsolved", "correct", ["correct"])
     assert said["wrong"].startswith("The proportion is upside down.")
 
 
 def test_a_teacher_gets_the_lesson_with_its_key_its_solution_and_its_sheets(lesson, tmp_path):
-    lesson.run("-m", "camviz", "teacher", str(tmp_path / "out"), "--no-run", "--slides", "--lesson", FREE)
-    edition = (tmp_path / "out" / f"{FREE}_shadows.ipynb").read_text(encoding="utf-8")
+    lesson.run("-m", "camviz", "teacher", str(tmp_path / "out"), "--no-run", "--slides", "--lesson", NUMBER)
+    edition = (tmp_path / "out" / f"{NUMBER}_shadows.ipynb").read_text(encoding="utf-8")
     assert "Right is **(a)** 6 m" in edition
     assert "### BEGIN SOLUTION" in edition
-    pages = {path.name: path.read_text(encoding="utf-8") for path in (tmp_path / "out").glob(f"{FREE}_*.html")}
-    assert set(pages) == {f"{FREE}_{name}.html" for name in ("exercises", "marking", "slides")}
-    assert "upside down" in pages["18_marking.html"]
+    pages = {path.name: path.read_text(encoding="utf-8") for path in (tmp_path / "out").glob(f"{NUMBER}_*.html")}
+    assert set(pages) == {f"{NUMBER}_exercises.html", f"{NUMBER}_marking.html", f"{NUMBER}_slides.html"}
+    assert "upside down" in pages[f"{NUMBER}_marking.html"]
     assert all("Shadows" in page for page in pages.values())
 
 

@@ -15,6 +15,7 @@ from camviz_school.views.fault_lab import FaultLabView
 from camviz_school.views.fisheye import FisheyeView
 from camviz_school.views.intrinsics import IntrinsicsView
 from camviz_school.views.light_field import LightFieldView
+from camviz_school.views.mosaic import MosaicView
 from camviz_school.views.noise import PhotonTransferView
 from camviz_school.views.omnidirectional import OmnidirectionalView
 from camviz_school.views.pinhole import PinholeView
@@ -47,6 +48,7 @@ PICTURES = {
     "omnidirectional": OmnidirectionalView(panels="doughnut window", hfov_deg=80.0),
     "sharpness": SharpnessView(f_number=2.8, defocus_um=20.0),
     "one_picture": VanishingView(panels="paper"),
+    "many_pictures": MosaicView(panels="mosaic"),
     "fault_lab": FaultLabView(fault="column off", strength=0.5, seed=5).worst(),
 }
 
