@@ -106,6 +106,12 @@ def gyroflow(path: Path) -> Iterator[Reference]:
     yield fisheye(K, held["fisheye_params"]["distortion_coeffs"])
 
 
+def photonvision(path: Path) -> Iterator[Reference]:
+    """OpenCV's K and coefficients, rows after rows."""
+    held = json.loads(path.read_text())
+    yield camera(np.reshape(held["cameraIntrinsics"]["data"], (3, 3)), held["distCoeffs"]["data"])
+
+
 def ocamcalib(path: Path) -> Iterator[Reference]:
     """cam2world of the toolbox, inverted by bisection along each ray's radius."""
     lines = [line for line in path.read_text().splitlines() if line.strip() and not line.startswith("#")]
@@ -397,6 +403,7 @@ REFERENCES: dict[str, Callable[[Path], Iterator[Reference]]] = {
         opensfm,
         orbslam,
         ost,
+        photonvision,
         qualisys,
         realsense,
         ros,
