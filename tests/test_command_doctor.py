@@ -1,12 +1,17 @@
 """The doctor sees what this machine has, and what is missing."""
 
 import json
+import os
+import subprocess
+import sys
 import types
+from pathlib import Path
 
 import pytest
 from commandline import run
 from packaging.requirements import Requirement
 
+from camviz_clinic.commands import entry
 from camviz_clinic.commands.command import main
 from camviz_school.commands import machine as doctor
 
@@ -66,3 +71,39 @@ def test_the_doctor_examines_this_machine():
     names = {finding["name"] for finding in report["findings"]}
     assert {"Python", "numpy", "OpenGL", "memory", "sample data", "widgets: anywidget"} <= names
     assert all(finding["remedy"] or finding["status"] == "ok" for finding in report["findings"])
+
+
+def test_another_projects_camviz_in_place_of_this_one_is_one_sentence(tmp_path):
+    """As TRI's: a package of the name that comes first on the path, and has nothing that this one needs."""
+    (tmp_path / "camviz").mkdir()
+    (tmp_path / "camviz/__init__.py").write_text("def objects(): ...\n")
+    here = str(Path(entry.__file__).parents[2])
+    program = "import sys; from camviz_clinic.commands.entry import main; sys.exit(main())"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), here])}
+    done = subprocess.run(
+        [sys.executable, "-c", program, "doctor"],
+        capture_output=True,
+        text=True,
+        env=environment,
+        cwd=tmp_path,
+        check=False,
+    )
+    assert done.returncode == 3
+    expected = (
+        f"camviz: another project's package of the same name is imported, {tmp_path / 'camviz'}: {entry.REMEDY}.\n"
+    )
+    assert (done.stdout, done.stderr) == ("", expected)
+
+
+def test_the_doctor_knows_a_package_of_the_same_name(monkeypatch):
+    assert (doctor.namesake().status, entry.other_package()) == ("ok", "")
+    monkeypatch.setattr(entry, "packages_distributions", lambda: {"camviz": ["camviz", "tri-camviz"], "numpy": ["x"]})
+    assert (doctor.namesake().status, doctor.namesake().detail) == ("warn", "tri-camviz has a package of the same name")
+    assert "python -m venv" in doctor.namesake().remedy
+    monkeypatch.setattr(entry, "OURS", Path("/elsewhere/camviz"))
+    assert doctor.namesake().status == "missing"
+
+
+def test_the_command_begins_where_the_package_is_looked_for():
+    text = (Path(entry.__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8")
+    assert 'camviz = "camviz_clinic.commands.entry:main"' in text

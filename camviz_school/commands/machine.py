@@ -18,6 +18,7 @@ from urllib.request import Request, urlopen
 
 from packaging.requirements import Requirement
 
+from camviz_clinic.commands import entry
 from camviz_school import server
 
 Status = Literal["ok", "warn", "missing"]
@@ -50,7 +51,18 @@ class ReportLine:
 def examine() -> list[ReportLine]:
     """Everything, in the order of the report. Takes some seconds where OpenGL is tried."""
     packages = [package(requirement, extra) for extra, requirement in requirements()]
-    return [python(), *packages, opencv(), *widgets(), promptness(), renderer(), opengl(), memory(), samples()]
+    return [
+        python(),
+        namesake(),
+        *packages,
+        opencv(),
+        *widgets(),
+        promptness(),
+        renderer(),
+        opengl(),
+        memory(),
+        samples(),
+    ]
 
 
 def as_text(findings: list[ReportLine]) -> str:
@@ -84,6 +96,15 @@ def python() -> ReportLine:
     if sys.version_info >= OLDEST_PYTHON:
         return ReportLine("Python", "ok", version)
     return ReportLine("Python", "missing", version, f"install Python {'.'.join(map(str, OLDEST_PYTHON))} or newer")
+
+
+def namesake() -> ReportLine:
+    """Whether another project's package `camviz` hides this one, or writes into its folder."""
+    if other := entry.other_package():
+        return ReportLine("camviz", "missing", f"another project's package of the same name: {other}", entry.REMEDY)
+    if others := entry.other_distributions():
+        return ReportLine("camviz", "warn", f"{', '.join(others)} has a package of the same name", entry.REMEDY)
+    return ReportLine("camviz", "ok", "no other project of the same name")
 
 
 def requirements() -> list[tuple[str, Requirement]]:

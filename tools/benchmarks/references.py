@@ -97,6 +97,21 @@ def openmvg(path: Path) -> Iterator[Reference]:
         yield camera(matrix(f, f, *held["principal_point"]), [k1, k2, 0, 0, k3])
 
 
+def gyroflow(path: Path) -> Iterator[Reference]:
+    """cv2.fisheye's four coefficients; the principal point is the middle unless the profile is asymmetrical."""
+    held = json.loads(path.read_text())
+    K = np.array(held["fisheye_params"]["camera_matrix"])
+    if not held.get("asymmetrical"):
+        K[:2, 2] = held["calib_dimension"]["w"] / 2, held["calib_dimension"]["h"] / 2
+    yield fisheye(K, held["fisheye_params"]["distortion_coeffs"])
+
+
+def photonvision(path: Path) -> Iterator[Reference]:
+    """OpenCV's K and coefficients, rows after rows."""
+    held = json.loads(path.read_text())
+    yield camera(np.reshape(held["cameraIntrinsics"]["data"], (3, 3)), held["distCoeffs"]["data"])
+
+
 def ocamcalib(path: Path) -> Iterator[Reference]:
     """cam2world of the toolbox, inverted by bisection along each ray's radius."""
     lines = [line for line in path.read_text().splitlines() if line.strip() and not line.startswith("#")]
@@ -373,6 +388,7 @@ REFERENCES: dict[str, Callable[[Path], Iterator[Reference]]] = {
         camodocal,
         easymocap,
         euroc,
+        gyroflow,
         kalibr,
         kitti,
         kitti_raw,
@@ -387,6 +403,7 @@ REFERENCES: dict[str, Callable[[Path], Iterator[Reference]]] = {
         opensfm,
         orbslam,
         ost,
+        photonvision,
         qualisys,
         realsense,
         ros,
