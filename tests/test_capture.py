@@ -85,7 +85,7 @@ def worst_held_out(found):
     return np.linalg.norm(fitted.residuals["camera"], axis=-1).max()
 
 
-# What it comes to ------------------------------------------------------------------------------------------------------
+# What it comes to -----------------------------------------------------------------------------------------------------
 
 
 def test_who_follows_the_ghost_knows_the_camera_after_twelve_views(hands, tmp_path):
@@ -124,7 +124,7 @@ def test_a_film_in_place_of_the_camera_gives_f_within_half_a_per_cent(pictures, 
     assert [path.name for path in sorted((tmp_path / "views").iterdir())] == list(found.pictures["camera"])
 
 
-# What is taken ----------------------------------------------------------------------------------------------------------
+# What is taken --------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("share", "still"), [(0.99, True), (1.01, False)])
@@ -186,12 +186,14 @@ def test_at_the_ghost_a_view_gains_what_the_ghost_would(hands, monkeypatch):
     assert guide.share(guide.pixels + [400, 0]) == 0  # half of it lies outside
 
 
-# What does not happen ---------------------------------------------------------------------------------------------------
+# What does not happen -------------------------------------------------------------------------------------------------
 
 
 def test_frames_are_answered_while_a_solution_takes_long_and_none_waits(hands, monkeypatch):
     go_on, begun = threading.Event(), []
-    monkeypatch.setattr(Session, "_solved", lambda self, gray: (begun.append(1), go_on.wait(60), session._Step(None))[2])
+    monkeypatch.setattr(
+        Session, "_solved", lambda self, gray: (begun.append(1), go_on.wait(60), session._Step(None))[2]
+    )
     hands.corners = SEEN
     answers = [hands.session.look(GRAY, 0.1 * number) for number in range(1, 200)]
     assert sum(answer.taken for answer in answers) == 1
@@ -228,13 +230,13 @@ def test_what_cannot_be_is_refused_in_one_sentence(hands, tmp_path):
     hands.show(None)
     with pytest.raises(ValueError, match="frames must have 640 × 480 pixels as the first had, got 320 × 240"):
         hands.session.look(GRAY[:240, :320], 1.0)
-    with pytest.raises(FilmError, match="none.mp4: there is no such film"):
+    with pytest.raises(FilmError, match=r"none\.mp4: there is no such film"):
         capture(BOARD, "none.mp4")
     with pytest.raises(ValueError, match="film must be given to run without a page"):
         capture(BOARD).run()
 
 
-# The page's messages ----------------------------------------------------------------------------------------------------
+# The page's messages --------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -273,7 +275,7 @@ def test_a_message_that_is_none_is_answered_by_a_sentence(page, message, buffers
     assert said in sent[0]["error"]
 
 
-# The quick finder -------------------------------------------------------------------------------------------------------
+# The quick finder -----------------------------------------------------------------------------------------------------
 
 
 def test_the_quick_finder_is_within_a_pixel_of_the_exact_one(pictures):

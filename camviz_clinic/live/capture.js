@@ -26,37 +26,33 @@ function render({ model, el }) {
     <p class="numbers"></p><svg viewBox="0 0 240 90" role="img" aria-label="σ of fx by the number of views"></svg><p class="promise"></p></div>`;
   const find = (query) => root.querySelector(query);
   const [video, frame, overlay] = [find("video"), find(".frame"), find(".overlay")];
-  const hidesStill = document.createElement("style");
-  hidesStill.textContent = model.get("still_hidden");
+  const hidesStill = Object.assign(document.createElement("style"), { textContent: model.get("still_hidden") });
   el.replaceChildren(hidesStill, root);
   find(".promise").textContent = model.get("promise");
   const film = model.get("film");
   find(".sentence").textContent = film ? "Press Start to play the film." : "Press Start, and allow the camera.";
   const stage = find(".camviz-stage");
-  const mirror = (on) => { stage.dataset.mirrored = String(on); };
-  if (film) { find(".mirror").checked = false; mirror(false); }
-  find(".mirror").addEventListener("change", (event) => mirror(event.target.checked));
+  const mirror = () => { stage.dataset.mirrored = String(find(".mirror").checked); };
+  find(".mirror").checked = !film;
+  mirror();
+  find(".mirror").addEventListener("change", mirror);
 
   let stream = null, running = false, number = 0, underWay = null, delay = null, late = null;
 
   const fail = (words) => { stop(); find(".error").textContent = words; find(".error").hidden = false; root.dataset.state = "refused"; };
   const stop = () => {
-    running = false;
-    underWay = null;
+    [running, underWay] = [false, null];
     clearTimeout(late);
     stream?.getTracks().forEach((track) => { track.onended = null; track.stop(); });
     stream = null;
     if (root.dataset.state === "live") root.dataset.state = "idle";
-    find(".start").disabled = false;
-    find(".stop").disabled = true;
+    [find(".start").disabled, find(".stop").disabled] = [false, true];
   };
   const start = async () => {
-    find(".error").hidden = true;
-    find(".start").disabled = true;
+    find(".error").hidden = find(".start").disabled = true;
     if (!film && !(await openCamera())) return;
     running = true;
-    root.dataset.state = "live";
-    find(".stop").disabled = false;
+    [root.dataset.state, find(".stop").disabled] = ["live", false];
     next();
   };
   const openCamera = async () => {
@@ -73,8 +69,7 @@ function render({ model, el }) {
       fail(REFUSED[error.name] ?? OTHER(error));
       return false;
     }
-    video.hidden = false;
-    return true;
+    return !(video.hidden = false);
   };
 
   const next = async () => {
@@ -89,8 +84,7 @@ function render({ model, el }) {
     model.send(message, undefined, buffers);
   };
   const grabbed = async () => {
-    frame.width = video.videoWidth;
-    frame.height = video.videoHeight;
+    Object.assign(frame, { width: video.videoWidth, height: video.videoHeight });
     frame.getContext("2d", { willReadFrequently: true }).drawImage(video, 0, 0);
     const blob = await new Promise((done) => frame.toBlob(done, "image/jpeg", QUALITY));
     return new DataView(await blob.arrayBuffer());
@@ -112,8 +106,7 @@ function render({ model, el }) {
   const showFrame = async (bytes) => {
     const bitmap = await createImageBitmap(new Blob([bytes], { type: "image/jpeg" }));
     frame.hidden = false;
-    frame.width = bitmap.width;
-    frame.height = bitmap.height;
+    Object.assign(frame, { width: bitmap.width, height: bitmap.height });
     frame.getContext("2d").drawImage(bitmap, 0, 0);
   };
 
@@ -125,7 +118,7 @@ function render({ model, el }) {
 
 function draw(canvas, answer) {
   const [width, height] = answer.size;
-  if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
+  if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
   const pen = canvas.getContext("2d");
   pen.clearRect(0, 0, width, height);
   pen.fillStyle = "rgba(0, 114, 178, 0.10)";
@@ -153,10 +146,7 @@ function outline(pen, points) {
   pen.closePath();
 }
 
-function fill(pen, points) {
-  outline(pen, points);
-  pen.fill();
-}
+function fill(pen, points) { outline(pen, points); pen.fill(); }
 
 function tell(root, { sentence, known, views, coverage, done }) {
   const say = root.querySelector(".sentence");
@@ -166,9 +156,7 @@ function tell(root, { sentence, known, views, coverage, done }) {
   const worst = largest ? ` · largest expected error ${largest.toPrecision(2)} px` : "";
   root.querySelector(".numbers").textContent = `${views} views · ${Math.round(100 * coverage)} % covered · ${focal}${worst}`;
   if (known.length && root.dataset.plotted !== String(known.length)) plot(root.querySelector("svg"), known);
-  root.dataset.plotted = known.length;
-  root.dataset.views = views;
-  root.dataset.done = done;
+  Object.assign(root.dataset, { plotted: known.length, views, done });
 }
 
 function plot(svg, known) {

@@ -7,6 +7,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
+from threading import Lock
 
 import cv2
 import numpy as np
@@ -127,6 +128,7 @@ class Session:
         self._trouble = ""
         self._thread = ThreadPoolExecutor(1, "camviz-capture")
         self._solving: Future[_Step] | None = None
+        self._once = Lock()
 
     def look(self, gray: Gray, time_s: float) -> Answer:
         """Look at a frame, and take it if it is worth it.
@@ -164,8 +166,8 @@ class Session:
 
     def wait(self) -> None:
         """Wait for what is being worked out."""
-        if self._solving:
-            self._solving.result()
+        if solving := self._solving:
+            solving.result()
         self._collect()
 
     @property
@@ -173,7 +175,9 @@ class Session:
         """The camera by the views taken so far. Raises CannotCalibrate before there is one."""
         self.wait()
         if self._calibration is None:
-            raise CannotCalibrate(f"no camera is known yet: {len(self.views)} views were taken. {self._trouble}".strip())
+            raise CannotCalibrate(
+                f"no camera is known yet: {len(self.views)} views were taken. {self._trouble}".strip()
+            )
         return self._calibration
 
     def save(self, path: str | PathLike[str], format: str = "opencv") -> tuple[str, ...]:
@@ -265,14 +269,20 @@ class Session:
         return _Step(views[-1], self._stamped(solved), next_guide, known)
 
     def _stamped(self, solved: Calibration) -> Calibration:
-        stamp = Stamp(made=now(), program=f"camviz {__version__}", model=self.model, views=len(solved.pictures["camera"]))
+        stamp = Stamp(
+            made=now(), program=f"camviz {__version__}", model=self.model, views=len(solved.pictures["camera"])
+        )
         return replace(solved, stamps={"camera": stamp})
 
     def _collect(self) -> None:
-        """Take over what the thread has worked out."""
-        if not self._solving or not self._solving.done():
-            return
-        step, self._solving = self._solving.result(), None
+        """Take over what the thread has worked out, once: front ends answer frames while a cell asks for the camera."""
+        with self._once:
+            if not self._solving or not self._solving.done():
+                return
+            step, self._solving = self._solving.result(), None
+            self._take_over(step)
+
+    def _take_over(self, step: _Step) -> None:
         self._trouble = step.why if step.view else f"{kind_of(self.board).title} was not found exactly, so no view."
         if step.view is None:
             return

@@ -47,7 +47,7 @@ class CaptureWidget(StillWidget):
 
     _esm = _HERE / "capture.js"
     _css = _HERE / "capture.css"
-    wanted: traitlets.Tuple[Any, ...] = traitlets.Tuple(WANTED, read_only=True).tag(sync=True)
+    wanted: Any = traitlets.Tuple(WANTED, read_only=True).tag(sync=True)
     film = traitlets.Bool(False, read_only=True).tag(sync=True)
     promise = traitlets.Unicode(PROMISE, read_only=True).tag(sync=True)
 
@@ -155,7 +155,7 @@ def capture(
         size: Width and height in pixels that the camera is asked for. Calibrate in the mode that you will use.
 
     Returns: The widget, whose `calibration` is the camera, and whose `save(path, format)` writes it.
-    Raises: ValueError for an unknown model or a goal that is not positive, and FilmError for a film that cannot be read.
+    Raises: ValueError for an unknown model or a goal that is not positive, FilmError for a film that cannot be read.
 
     >>> from camviz_clinic.calibration import Board
     >>> from camviz_clinic.films.virtual import example
@@ -174,7 +174,7 @@ def _frames(film: Film) -> Iterator[tuple[Gray, float]]:
 
 def _rounded(pixels: Array) -> list[Any]:
     """Nested lists; None where there is no pixel, because JSON has no NaN."""
-    return np.where(np.isfinite(pixels), np.round(pixels, 1), None).tolist()  # type: ignore[call-overload,no-any-return]
+    return np.where(np.isfinite(pixels), np.round(pixels, 1), None).tolist()  # type: ignore[call-overload]
 
 
 def _finite(value: float) -> float | None:

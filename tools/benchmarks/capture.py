@@ -2,8 +2,8 @@
 
 Each novice holds a board before a virtual webcam whose truth is known; the frames are rendered, and go through
 `camviz_clinic.live.Session` as a notebook's do. The same novices without a ghost hold it as hands do: in the middle,
-tilted a little. Their views count up to the same goal. Held-out errors are over boards all over the picture, whose poses
-are fitted and whose corners are exact.
+tilted a little. Their views count up to the same goal. Held-out errors are over boards all over the picture, whose
+poses are fitted and whose corners are exact.
 """
 
 from __future__ import annotations
