@@ -7,6 +7,7 @@
     checks        the findings: what an inspection looks for, and how sure it is
     views         residuals, coverage, uncertainty: a picture for each finding
     report        one page, or one cell of a notebook, that says it all
+    live          a webcam calibrated in a notebook, guided: `capture(board)`
     plots         the same curves on matplotlib's axes
     meshes        cameras and boards for pyvista
     commands      the command line
@@ -20,13 +21,14 @@ from typing import Any
 
 _HOME = {
     "Calibration": "camviz_clinic.calibration",
+    "capture": "camviz_clinic.live.widget",
     "inspect": "camviz_clinic.report.notebook",
     "load": "camviz_clinic.files",
 }
 
 _PARTS = ("calibration", "checks", "meshes", "plots", "rigs")
 
-__all__ = ["Calibration", "inspect", "load", *_PARTS]
+__all__ = ["Calibration", "capture", "inspect", "load", *_PARTS]
 
 
 def __getattr__(name: str) -> Any:

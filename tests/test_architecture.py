@@ -29,7 +29,7 @@ LAYERS = {
         ("files", "rigs"),
         ("checks",),
         ("datasets", "films", "handeye", "views"),
-        ("meshes", "plots", "report"),
+        ("live", "meshes", "plots", "report"),
         ("commands",),
     ),
     "camviz_school": (
