@@ -118,15 +118,9 @@ def test_a_teacher_gets_the_lesson_with_its_key_its_solution_and_its_sheets(less
     edition = (tmp_path / "out" / f"{NUMBER}_shadows.ipynb").read_text(encoding="utf-8")
     assert "Right is **(a)** 6 m" in edition
     assert "### BEGIN SOLUTION" in edition
-<<<<<<< HEAD
     pages = {path.name: path.read_text(encoding="utf-8") for path in (tmp_path / "out").glob(f"{NUMBER}_*.html")}
     assert set(pages) == {f"{NUMBER}_exercises.html", f"{NUMBER}_marking.html", f"{NUMBER}_slides.html"}
     assert "upside down" in pages[f"{NUMBER}_marking.html"]
-=======
-    pages = {path.name: path.read_text(encoding="utf-8") for path in (tmp_path / "out").glob(f"{FREE}_*.html")}
-    assert set(pages) == {f"{FREE}_{name}.html" for name in ("exercises", "marking", "slides")}
-    assert "upside down" in pages[f"{FREE}_marking.html"]
->>>>>>> lesson-18
     assert all("Shadows" in page for page in pages.values())
 
 
