@@ -51,7 +51,10 @@ def lesson(tmp_path_factory):
 
 def test_a_lesson_is_a_notebook_and_its_folder():
     written = example("lessons/")
-    assert {re.match(r"lessons/(material/\d+|.*)", path)[1] for path in written} == {"18_shadows.ipynb", "material/18"}
+    assert {re.match(r"lessons/(material/\d+|.*)", path)[1] for path in written} == {
+        f"{NUMBER}_shadows.ipynb",
+        f"material/{NUMBER}",
+    }
 
 
 def test_the_pages_list_the_lesson_in_its_place_and_nothing_else_is_written(lesson):

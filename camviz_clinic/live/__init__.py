@@ -6,9 +6,9 @@ The names below are imported when they are first used: a session needs no notebo
 from importlib import import_module
 from typing import Any
 
-_HOME = {"Answer": "session", "CaptureWidget": "widget", "Session": "session", "capture": "widget"}
+_HOME = {"FrameAnswer": "session", "CaptureWidget": "widget", "Session": "session", "capture": "widget"}
 
-__all__ = ["Answer", "CaptureWidget", "Session", "capture"]
+__all__ = ["FrameAnswer", "CaptureWidget", "Session", "capture"]
 
 
 def __getattr__(name: str) -> Any:

@@ -36,7 +36,7 @@ CELLS = (8, 6)  # of the picture, whose share with a corner is the coverage
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class TakenView:
     """A view that was taken: its frame and the corners in it, (n, 2) pixels."""
 
     gray: Gray
@@ -54,7 +54,7 @@ class Known:
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class FrameAnswer:
     """What a frame showed, and what to do now.
 
     Args:
@@ -62,7 +62,7 @@ class Answer:
         taken: Whether the frame was taken as a view.
         sentence: What to do, for a person.
 
-    >>> Answer(None, False, "Hold the board into the picture.").taken
+    >>> FrameAnswer(None, False, "Hold the board into the picture.").taken
     False
     """
 
@@ -75,7 +75,7 @@ class Answer:
 class _Step:
     """What came of a frame that was taken: without a view its corners were not found; `why` there is no camera."""
 
-    view: View | None
+    view: TakenView | None
     calibration: Calibration | None = None
     guide: Guide | None = None
     known: Known | None = None
@@ -116,7 +116,7 @@ class Session:
         if not most >= FEWEST:
             raise ValueError(f"most must be at least {FEWEST} views, got {most}")
         self.board, self.model, self.goal, self.most = board, model, goal, most
-        self.views: tuple[View, ...] = ()
+        self.views: tuple[TakenView, ...] = ()
         self.known: tuple[Known, ...] = ()
         self.done = False
         self.guide: Guide | None = None
@@ -130,7 +130,7 @@ class Session:
         self._solving: Future[_Step] | None = None
         self._once = Lock()
 
-    def look(self, gray: Gray, time_s: float) -> Answer:
+    def look(self, gray: Gray, time_s: float) -> FrameAnswer:
         """Look at a frame, and take it if it is worth it.
 
         Args:
@@ -143,17 +143,17 @@ class Session:
         self._collect()
         self._same_size(gray)
         if self.done:
-            return Answer(None, False, self.verdict)
+            return FrameAnswer(None, False, self.verdict)
         seen, before = track(gray, self.board, time_s), self._before
         self._before = seen
         if seen is None:
-            return Answer(None, False, "Hold the board into the picture, the whole of it.")
+            return FrameAnswer(None, False, "Hold the board into the picture, the whole of it.")
         if self._solving:
-            return Answer(seen.corners, False, f"View {len(self.views) + 1} is taken; what it says is worked out.")
+            return FrameAnswer(seen.corners, False, f"View {len(self.views) + 1} is taken; what it says is worked out.")
         if what_lacks := self._lacks(seen, before):
-            return Answer(seen.corners, False, what_lacks)
+            return FrameAnswer(seen.corners, False, what_lacks)
         self._solving = self._thread.submit(self._solved, gray.copy())
-        return Answer(seen.corners, True, f"View {len(self.views) + 1} is taken.")
+        return FrameAnswer(seen.corners, True, f"View {len(self.views) + 1} is taken.")
 
     def run(self, frames: Iterable[tuple[Gray, float]]) -> Session:
         """Look at frames and their times, wait for each solution, and stop at the goal; itself."""
@@ -254,7 +254,7 @@ class Session:
         corners = find_corners(gray, self.board)
         if corners is None:
             return _Step(None)
-        views = (*self.views, View(gray, corners))
+        views = (*self.views, TakenView(gray, corners))
         height, width = gray.shape
         found = Detections(self._names(len(views)), np.array([view.corners for view in views]), width, height)
         try:

@@ -19,7 +19,7 @@ from camviz.widgets.still import StillWidget
 from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.checks.summary import GOOD
 from camviz_clinic.films.reading import Film
-from camviz_clinic.live.session import Answer, Session
+from camviz_clinic.live.session import FrameAnswer, Session
 from camviz_clinic.live.tracking import Gray, decoded
 
 _HERE = Path(__file__).parent
@@ -113,7 +113,7 @@ class CaptureWidget(StillWidget):
         if len(self.session.views) > views:
             self.keep_soon()
 
-    def _told(self, answer: Answer, gray: Gray) -> dict[str, Any]:
+    def _told(self, answer: FrameAnswer, gray: Gray) -> dict[str, Any]:
         """What the page is told of a frame: pixels rounded to a tenth."""
         session, guide = self.session, self.session.guide
         board = session.board

@@ -48,7 +48,7 @@ PICTURES = {
     "omnidirectional": OmnidirectionalView(panels="doughnut window", hfov_deg=80.0),
     "sharpness": SharpnessView(f_number=2.8, defocus_um=20.0),
     "one_picture": VanishingView(panels="paper"),
-    "many_pictures": MosaicView(panels="mosaic"),
+    "mosaic": MosaicView(panels="mosaic"),
     "fault_lab": FaultLabView(fault="column off", strength=0.5, seed=5).worst(),
 }
 

@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from camviz import twoview
 from camviz.cameras import Camera, Intrinsics
@@ -95,7 +96,7 @@ class MosaicView(View):
         return uv + self.noise * error[0], np.where(is_wrong, nonsense, to + self.noise * error[1])
 
     @cached_property
-    def used(self) -> Array:
+    def used(self) -> NDArray[np.bool_]:
         """Which of the matches (n,) H is estimated from."""
         points = self.exact[0]
         on = {"wall": np.abs(points[:, 2] - 6.5) < 0.04, "floor": np.abs(points[:, 1] - FLOOR) < 0.02}
@@ -158,7 +159,7 @@ class MosaicView(View):
                 into = small @ to_canvas @ matrix @ np.linalg.inv(small)
                 made += cv2.warpPerspective(image.astype(np.float32), into, size)
                 weight += cv2.warpPerspective(np.ones(image.shape[:2], np.float32), into, size)
-        ground = np.maximum(1 - weight, 0)[..., None] * np.float32(garden.NOTHING)
+        ground = np.maximum(1 - weight, 0)[..., None] * np.asarray(garden.NOTHING, np.float32)
         return np.asarray((made / np.maximum(weight, 1)[..., None] + ground).round(), np.uint8)
 
     def _taken(self, draft: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -225,7 +226,7 @@ def notice(panel: Panel, problem: str) -> str:
     return ground + svg.paragraph((18, 28), problem, panel.width - 36) if problem else ""
 
 
-def in_sight(camera: Camera, points: Array) -> Array:
+def in_sight(camera: Camera, points: Array) -> NDArray[np.bool_]:
     """Which of the garden's points (n, 3) are in a camera's picture, and nothing is in front of them."""
     rays = points - camera.centre
     away = np.linalg.norm(rays, axis=-1)
