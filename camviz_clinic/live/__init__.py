@@ -8,7 +8,7 @@ from typing import Any
 
 _HOME = {"FrameAnswer": "session", "CaptureWidget": "widget", "Session": "session", "capture": "widget"}
 
-__all__ = ["FrameAnswer", "CaptureWidget", "Session", "capture"]
+__all__ = ["CaptureWidget", "FrameAnswer", "Session", "capture"]
 
 
 def __getattr__(name: str) -> Any:

@@ -57,7 +57,7 @@ def house_scene() -> Scene:
     middle, across, deep = ((_LEFT + _RIGHT) / 2, EYE, (_NEAR + _FAR) / 2), _RIGHT - _LEFT, _FAR - _NEAR
     wall = box(middle, (across, EYE - _TOP - 0.22, deep), baked("bricks", repeat=True), tile=1.6)
     roof = box((middle[0], _TOP + 0.22, middle[2]), (across, 0.22, deep), Texture.plain((0.90, 0.87, 0.80)))
-    path = Rectangle((_RIGHT, EYE, _FAR), (1.2, 0, 0), (0, 0, -9.0), Texture(paint.paving(3, 22, 16)))
+    path = Rectangle(_at(_RIGHT, EYE, _FAR), _at(1.2, 0, 0), _at(0, 0, -9), Texture(paint.paving(3, 22, 16)))
     lawn = Ground(EYE + 0.004, baked("lawn", repeat=True), tile=3.2)
     return Scene([*_lamps(), *_openings(), *roof, *wall, path, lawn], baked("sky", repeat=True))
 
@@ -66,15 +66,20 @@ def _openings() -> list[Rectangle]:
     """The door and two windows in the wall on the right, three windows in the one on the left."""
     pane = np.full((44, 52, 3), 235, np.uint8)
     pane[4:40, 4:24] = pane[4:40, 28:48] = (58, 78, 98)
-    glass, top, down = Texture(pane), EYE - DOOR, (0, 1.1, 0)
-    door = Rectangle((_RIGHT + 0.01, top, 4.6), (0, 0, 1.0), (0, DOOR, 0), baked("planks"))
-    right = [Rectangle((_RIGHT + 0.01, top, z), (0, 0, 1.3), down, glass) for z in (6.5, 8.5)]
-    return [door, *right, *(Rectangle((x, top, _NEAR - 0.01), (1.3, 0, 0), down, glass) for x in (-4.7, -6.7, -8.7))]
+    glass, top, down = Texture(pane), EYE - DOOR, _at(0, 1.1, 0)
+    door = Rectangle(_at(_RIGHT + 0.01, top, 4.6), _at(0, 0, 1), _at(0, DOOR, 0), baked("planks"))
+    right = [Rectangle(_at(_RIGHT + 0.01, top, z), _at(0, 0, 1.3), down, glass) for z in (6.5, 8.5)]
+    left = [Rectangle(_at(x, top, _NEAR - 0.01), _at(1.3, 0, 0), down, glass) for x in (-4.7, -6.7, -8.7)]
+    return [door, *right, *left]
 
 
 def _lamps() -> list[Column | Sphere]:
     iron = Texture(paint.lit_round(paint.plain(1, 32, (0.20, 0.25, 0.27)), upright=True))
     glass = Texture(paint.lit_round(paint.plain(32, 64, (0.98, 0.96, 0.90))))
     places = [(-1.2, EYE, z) for z in (5.0, 7.5, 10.0, 12.5)]
-    posts = [Column(foot, 2.2, 0.04, iron) for foot in places]
-    return [*posts, *(Sphere((x, y - 2.33, z), 0.15, glass) for x, y, z in places)]
+    posts = [Column(_at(*foot), 2.2, 0.04, iron) for foot in places]
+    return [*posts, *(Sphere(_at(x, y - 2.33, z), 0.15, glass) for x, y, z in places)]
+
+
+def _at(*xyz: float) -> Array:
+    return np.array(xyz, dtype=float)
