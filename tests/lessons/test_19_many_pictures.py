@@ -49,8 +49,8 @@ def test_the_mosaic_is_opencv_s_warp_to_a_grey_level(turn):
     into = [move @ matrix @ np.linalg.inv(small) for matrix in (np.eye(3), H)]
     over, under = (cv2.warpPerspective(one.astype(np.float32), M, size) for one, M in zip(pictures, into, strict=True))
     filled = [cv2.warpPerspective(np.ones((300, 400), np.uint8), M, size) for M in into]
-    first, second = (cv2.erode(one, np.ones((5, 5))) > 0 for one in filled)
-    neither = [cv2.dilate(one, np.ones((5, 5))) == 0 for one in filled]
+    first, second = (cv2.erode(one, np.ones((11, 11))) > 0 for one in filled)
+    neither = [cv2.dilate(one, np.ones((11, 11))) == 0 for one in filled]
     shown = view.picture().astype(float)
     places = [(first & second, (over + under) / 2), (first & neither[1], over), (second & neither[0], under)]
     assert sum(where.sum() for where, _ in places) > 100_000
