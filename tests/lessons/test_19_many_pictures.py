@@ -33,10 +33,7 @@ def carried(H, uv):
 
 @pytest.mark.parametrize("turn", [0.0, 12.0, 24.0, 30.0])
 def test_the_mosaic_is_opencv_s_warp_to_a_grey_level(turn):
-    """In full size, pixel for pixel; H is the one that OpenCV finds from the same matches.
-
-    OpenCV's warp of bytes rounds places to 1/32 px, which is 12 grey levels at a sharp edge; here it warps floats.
-    """
+    """In full size, away from borders, with an H that is the one OpenCV finds from the same matches."""
     view = MosaicView(turn=turn, noise=0.0)
     pictures = [garden.taken(camera, garden.FINE)[0] for camera in (view.first, view.second)]
     H = view.H
