@@ -29,7 +29,7 @@ def read(path: Path) -> Notebook:
 
     try:
         return nbformat.read(path, as_version=4)
-    except (nbformat.reader.NotJSONError, nbformat.ValidationError) as error:
+    except (nbformat.reader.NotJSONError, nbformat.ValidationError, AttributeError, KeyError, TypeError) as error:
         raise ValueError(f"{path} is not a notebook: {error}") from error
 
 
