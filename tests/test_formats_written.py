@@ -76,6 +76,8 @@ HOLDS = {
     "opensfm": {*BROWN5, "fisheye", "equidistant"},
     "camodocal": {"perspective", "brown4", "brown5", "brown8", "fisheye", "equidistant", "mei", "ucm"},
     "orbslam": {*BROWN5, "fisheye", "equidistant"},
+    "gyroflow": {*BROWN5, "brown8", "brown12", "fisheye", "mei", "ucm"},
+    "photonvision": {*BROWN5, "brown8", "brown12"},
 }
 HOLDS["colmap-bin"] = HOLDS["colmap"]
 POSE = RigidTransform.from_components([0.3, -0.2, 0.1], Rotation.from_rotvec([0.3, -1.2, 0.4]))

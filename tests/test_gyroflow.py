@@ -288,8 +288,8 @@ def test_what_is_written_is_read_back_to_the_last_digit(tmp_path, lens):
 @pytest.mark.parametrize(
     ("lens", "sentence"),
     [
-        (Equidistant(), "takes a fisheye of four zeros for a pinhole, and camera has such a fisheye"),
-        (KannalaBrandt(), "takes a fisheye of four zeros for a pinhole, and camera has such a fisheye"),
+        (Equidistant(), "has no place for camera's fisheye of four zeros, which it takes for a pinhole"),
+        (KannalaBrandt(), "has no place for camera's fisheye of four zeros, which it takes for a pinhole"),
         (BrownConrady(tau_x=0.1), "has no place for tau_x of camera"),
     ],
 )

@@ -5,12 +5,12 @@ Other projects have the same name, such as TRI's viewer for depth estimation. Th
 
 from __future__ import annotations
 
-import sys
 from importlib.metadata import packages_distributions
 from importlib.util import find_spec
 from pathlib import Path
 
 from camviz_clinic.commands.common import LACKING
+from camviz_clinic.commands.terminal import say
 
 OURS = Path(__file__).resolve().parents[2] / "camviz"
 REMEDY = (
@@ -22,7 +22,7 @@ REMEDY = (
 def main() -> int:
     """The command line, or one sentence where `import camviz` would find another project."""
     if other := other_package():
-        print(f"camviz: another project's package of the same name is imported, {other}: {REMEDY}.", file=sys.stderr)
+        say(f"another project's package of the same name is imported, {other}: {REMEDY}.")
         return LACKING
     from camviz_clinic.commands.command import main as command
 

@@ -206,7 +206,7 @@ def write(calibration: Calibration) -> bytes:
     model, same = expressed(name, camera, MODELS, TITLE)
     fx, fy, cx, cy, *values = model.values(same, 0.0)
     if model is FISHEYE and not any(values):
-        raise CalibrationError(f"{TITLE} takes a fisheye of four zeros for a pinhole, and {name} has such a fisheye")
+        raise CalibrationError(f"{TITLE} has no place for {name}'s fisheye of four zeros, which it takes for a pinhole")
     if model is SPHERE:
         values.insert(2, 0.0)
     size = {"w": camera.intrinsics.width, "h": camera.intrinsics.height}

@@ -58,7 +58,7 @@ class FrameAnswer:
     """What a frame showed, and what to do now.
 
     Args:
-        corners: The board in the frame, (n, 2) pixels; None where it was not seen.
+        corners: (n, 2), the board in the frame, in pixels; None where it was not seen.
         taken: Whether the frame was taken as a view.
         sentence: What to do, for a person.
 
@@ -108,6 +108,10 @@ class Session:
     'Hold the board into the picture, the whole of it.'
     """
 
+    views: tuple[TakenView, ...]
+    known: tuple[Known, ...]
+    done: bool
+
     def __init__(self, board: Board, model: str = "standard", goal: float = GOOD, most: int = MOST) -> None:
         if model not in MODELS:
             raise ValueError(f"model must be one of {', '.join(MODELS)}, got {model!r}")
@@ -116,8 +120,8 @@ class Session:
         if not most >= FEWEST:
             raise ValueError(f"most must be at least {FEWEST} views, got {most}")
         self.board, self.model, self.goal, self.most = board, model, goal, most
-        self.views: tuple[TakenView, ...] = ()
-        self.known: tuple[Known, ...] = ()
+        self.views = ()
+        self.known = ()
         self.done = False
         self.guide: Guide | None = None
         self._calibration: Calibration | None = None
@@ -134,7 +138,7 @@ class Session:
         """Look at a frame, and take it if it is worth it.
 
         Args:
-            gray: (height, width) of uint8.
+            gray: (height, width) of uint8, grey levels.
             time_s: When it was taken, in seconds from any moment on.
 
         Returns: What was seen, and what to do now.
@@ -156,7 +160,13 @@ class Session:
         return FrameAnswer(seen.corners, True, f"View {len(self.views) + 1} is taken.")
 
     def run(self, frames: Iterable[tuple[Gray, float]]) -> Session:
-        """Look at frames and their times, wait for each solution, and stop at the goal; itself."""
+        """Look at frames, wait for each solution, and stop at the goal.
+
+        Args:
+            frames: (height, width) of grey levels each, with the time in seconds when it was taken.
+
+        Returns: Itself.
+        """
         for gray, time_s in frames:
             if self.look(gray, time_s).taken:
                 self.wait()
@@ -181,11 +191,21 @@ class Session:
         return self._calibration
 
     def save(self, path: str | PathLike[str], format: str = "opencv") -> tuple[str, ...]:
-        """Write the calibration: `camviz_clinic.files.write` of it, whose sentences are returned."""
+        """Write the calibration.
+
+        Args:
+            path: Where to.
+            format: One of `camviz_clinic.files.formats()`.
+
+        Returns: In sentences what the format cannot hold.
+        """
         return write(self.calibration, path, format)
 
     def save_pictures(self, folder: str | PathLike[str]) -> None:
-        """Write the frames of the views as PNG, view01.png and so on, to a folder that is made.
+        """Write the frames of the views as PNG, view01.png and so on.
+
+        Args:
+            folder: Where to; made when it is not there.
 
         Raises: OSError where they cannot be written.
         """

@@ -35,8 +35,12 @@ class CaptureWidget(StillWidget):
     One frame is under way at a time: the page sends the next one, its newest, when the last one is answered. So a slow
     kernel is sent fewer frames and never old ones. With a film, the kernel reads the frames and the page asks for them.
 
-    Attributes:
+    Args:
         session: The calibration itself.
+        film: Read by the kernel in place of the camera.
+        size: Width and height in pixels that the camera is asked for.
+
+    Attributes:
         delays_ms: Of the last 600 frames, the time from the camera to the overlay, as the page measured it.
 
     >>> from camviz_clinic.calibration import Board
@@ -45,6 +49,8 @@ class CaptureWidget(StillWidget):
     ((), 'Guided calibration. Run this cell, and press Start.')
     """
 
+    session: Session
+    delays_ms: deque[float]
     _esm = _HERE / "capture.js"
     _css = _HERE / "capture.css"
     wanted: Any = traitlets.Tuple(WANTED, read_only=True).tag(sync=True)
@@ -53,7 +59,7 @@ class CaptureWidget(StillWidget):
 
     def __init__(self, session: Session, film: Film | None = None, size: tuple[int, int] = WANTED) -> None:
         self.session = session
-        self.delays_ms: deque[float] = deque(maxlen=LAST)
+        self.delays_ms = deque(maxlen=LAST)
         self._frames = None if film is None else _frames(film)
         super().__init__()
         self.set_trait("film", film is not None)
@@ -66,12 +72,20 @@ class CaptureWidget(StillWidget):
         return self.session.calibration
 
     def save(self, path: str | PathLike[str], format: str = "opencv") -> tuple[str, ...]:
-        """Write the calibration in a format of `camviz_clinic.files.formats()`; in sentences what it cannot hold."""
+        """Write the calibration.
+
+        Args:
+            path: Where to.
+            format: One of `camviz_clinic.files.formats()`.
+
+        Returns: In sentences what the format cannot hold.
+        """
         return self.session.save(path, format)
 
     def run(self) -> CaptureWidget:
-        """Without a page: take the views from the film, to the goal or its end; itself.
+        """Without a page: take the views from the film, to the goal or its end.
 
+        Returns: Itself.
         Raises: ValueError without a film.
         """
         if self._frames is None:
