@@ -8,7 +8,6 @@ import nbformat
 import numpy as np
 import pytest
 from laboratory import BROWSERS, FLAGS, LATE_MS, Notebook, jupyterlab
-from playwright.sync_api import sync_playwright
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady
@@ -36,12 +35,12 @@ EXECUTE = """async (code) => {
   return out;
 }"""
 SLOW = """import time
-from camviz_clinic.live import Answer
+from camviz_clinic.live import FrameAnswer
 def slowly(gray, time_s):
     if time_s > 0 and getattr(widget, "begun", False):
         time.sleep(SECONDS)
     widget.begun = True
-    return Answer(None, False, "slow")
+    return FrameAnswer(None, False, "slow")
 widget.session.look = slowly"""
 INSECURE = "() => Object.defineProperty(navigator, 'mediaDevices', { value: undefined, configurable: true })"
 EMBEDDED = """() => {
@@ -71,7 +70,7 @@ def write_film(path: Path, stops: int = 12, frames: int = 6, rate: int = 5) -> N
 
 
 @pytest.fixture(scope="module")
-def opened(tmp_path_factory):
+def opened(tmp_path_factory, browser):
     """Opens the notebook in a new page of a browser whose camera is a film, and runs it."""
     home = tmp_path_factory.mktemp("capture")
     film = home / "film.y4m"
@@ -81,18 +80,18 @@ def opened(tmp_path_factory):
     nbformat.write(book, home / "work/capture.ipynb")
     fake = ["--use-fake-device-for-media-stream", f"--use-file-for-fake-video-capture={film}"]
     path = os.environ.get("CAMVIZ_CHROMIUM") or next(filter(None, map(shutil.which, BROWSERS)))
-    with jupyterlab(home / "work", home / "private") as address, sync_playwright() as playwright:
+    with jupyterlab(home / "work", home / "private") as address:
         flags = [*FLAGS, *fake, "--use-fake-ui-for-media-stream"]
-        browser = playwright.chromium.launch(executable_path=path, args=flags)
+        filmed = browser.browser_type.launch(executable_path=path, args=flags)  # beside the one of the other tests
 
         def anew() -> Notebook:
-            notebook = Notebook(browser, address, "capture.ipynb")
+            notebook = Notebook(filmed, address, "capture.ipynb")
             notebook.run_all()
             notebook.page.wait_for_selector(START)
             return notebook
 
         yield anew
-        browser.close()
+        filmed.close()
 
 
 @pytest.fixture
