@@ -206,7 +206,14 @@ def test_an_empty_answer_without_its_mark_is_known_by_its_id():
     where = at(notebook, "solution")
     name = mark(notebook.cells[where])
     notebook.cells[where].source, notebook.cells[where].metadata = "", nbformat.NotebookNode()
-    assert mending.mended(OUT, notebook).sentences == (f"{name}: the cell had lost its mark.",)
+    assert mending.mended(OUT, notebook).sentences == (f"{name}: its cell had lost its mark.",)
+
+
+def test_an_answer_beside_its_cell_is_said_to_be_there():
+    notebook = solved()
+    name = mark(notebook.cells[at(notebook, "solution")])
+    answered_above(notebook)
+    assert f"{name}: the answer stood in another cell." in mending.mended(OUT, notebook).sentences
 
 
 def test_a_whole_notebook_is_left_as_it_is():

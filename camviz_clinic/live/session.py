@@ -9,10 +9,10 @@ from os import PathLike
 from pathlib import Path
 from threading import Lock
 
-import cv2
 import numpy as np
 
 from camviz import __version__
+from camviz.draw.picture import png
 from camviz.lenses.base import Array
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.boards import kind_of
@@ -211,8 +211,7 @@ class Session:
         """
         Path(folder).mkdir(parents=True, exist_ok=True)
         for name, view in zip(self._names(), self.views, strict=True):
-            done, content = cv2.imencode(".png", view.gray)
-            Path(folder, name).write_bytes(content.tobytes() if done else b"")
+            Path(folder, name).write_bytes(png(view.gray))
 
     @property
     def coverage(self) -> float:

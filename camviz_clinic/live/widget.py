@@ -10,10 +10,10 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import traitlets
 
+from camviz.draw.picture import jpeg
 from camviz.lenses.base import Array
 from camviz.widgets.still import StillWidget
 from camviz_clinic.calibration.types import Board, Calibration
@@ -116,14 +116,14 @@ class CaptureWidget(StillWidget):
             gray, time_s = next(self._frames, (None, 0.0))
             if gray is None:
                 raise ValueError(f"The film is at its end. {self.session.verdict}")
-            jpeg = [cv2.imencode(".jpg", gray)[1].tobytes()]
+            sent = [jpeg(gray)]
         else:
             if len(buffers) != 1 or len(buffers[0]) > MOST_BYTES:
                 raise ValueError(f"a message must hold one frame of at most {MOST_BYTES} bytes, got {len(buffers)}")
-            gray, time_s, jpeg = decoded(buffers[0]), float(message["time"]), []
+            gray, time_s, sent = decoded(buffers[0]), float(message["time"]), []
         views = len(self.session.views)
         answer = self.session.look(gray, time_s)
-        self.send({"number": message["number"], **self._told(answer, gray)}, buffers=jpeg)
+        self.send({"number": message["number"], **self._told(answer, gray)}, buffers=sent)
         if len(self.session.views) > views:
             self.keep_soon()
 

@@ -40,8 +40,8 @@ class Mended:
 def mended(handed_out: Notebook, handed_in: Notebook) -> Mended:
     """Put each cell of the student's into the place of the one that it was; cells of their own stay behind it.
 
-    A cell is known by nbgrader's mark, its id, its text, or the function that it defines. Of several the first counts,
-    and the others run behind it as cells of the student's own. Where an answer is not found, its cell is as handed out.
+    A cell is known by nbgrader's mark, its id, its text, or the function that it defines. Where a stub is empty or as
+    it was handed out, the last other cell that defines its function is the answer; without one, so it stays.
 
     Raises: AnotherNotebookError where less than half of the cells that were handed out are in it.
     """
@@ -148,9 +148,11 @@ def _told(handed_out: list[Cell], handed_in: list[Cell], places: dict[int, int])
         if found.cell_type != cell.cell_type:
             yield f"{name}: the cell was turned into {found.cell_type}, and is code again."
         if marks.count(name) > 1:
-            yield f"{name}: {marks.count(name)} cells have its mark; the first is graded, the others run behind it."
+            yield f"{name}: {marks.count(name)} cells have its mark; one of them has it now."
         if _mark(found) != name:
-            yield f"{name}: the cell had lost its mark."
+            yield f"{name}: " + (
+                "its cell had lost its mark." if name not in marks else "the answer stood in another cell."
+            )
     found_at = [places[number] for number in sorted(places)]
     if found_at != sorted(found_at):
         yield "Cells stood in another order, and stand as they were handed out."
