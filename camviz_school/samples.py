@@ -1,5 +1,5 @@
-"""Sample data: the 26 chessboard photographs of OpenCV's samples and their published calibrations (Apache-2.0), and a
-stereo pair with its true disparities from scikit-image.
+"""Sample data: the 26 chessboard photographs of OpenCV's samples, their published calibrations and a photograph of a
+building (Apache-2.0), and a stereo pair with its true disparities from scikit-image.
 
 A file is looked for in the folder that CAMVIZ_SAMPLES names, then among those fetched before, then on the network; its
 sha256 is checked wherever it comes from. Where there is none, the virtual camera pictures a chessboard instead.
@@ -59,6 +59,7 @@ REGISTRY = {
     "intrinsics.yml": "c419615d0f1794cdd64eba97da74f5f6b15c31eb09bdd9cf7b6025d00764f92b",
     "left_intrinsics.yml": "93a35a94eaaa63afba5128292cf2800fce3e783eba12a69e3d3731360d594684",
     "stereo_calib.xml": "585a31531d6624f34acfce2cc9ca0be4d46d30db061494c8ea189f7274b80391",
+    "building.jpg": "742a1baad62ac82e91e718e77eedf7e85c2eddc4badfb8c87c6cbc86c45a8b07",
 }
 
 

@@ -50,7 +50,7 @@ def test_missing_samples_are_a_warning_not_a_fault(tmp_path, monkeypatch):
     monkeypatch.setattr("camviz_school.samples._pooch", lambda: types.SimpleNamespace(path=tmp_path))
     monkeypatch.setattr("camviz_school.samples.BASE_URL", "http://127.0.0.1:9/")
     finding = doctor.samples()
-    assert (finding.status, finding.detail[:7]) == ("warn", "0 of 29")
+    assert (finding.status, finding.detail[:7]) == ("warn", "0 of 30")
 
 
 def test_the_report_is_the_same_for_people_and_programs(monkeypatch, capsys):

@@ -1,11 +1,16 @@
 """Lesson 18: vanishing points, the focal length, heights and P, each beside OpenCV or plain geometry."""
 
+import ast
+
 import cv2
 import numpy as np
 import pytest
+from quoting import LESSONS
 from scipy.linalg import rq
 
+from camviz_school.course import notebooks
 from camviz_school.course.exercises import exercise
+from camviz_school.samples import SampleUnavailable, sample
 from camviz_school.views.house import DOOR, EYE, camera, edges
 from camviz_school.views.staff import StaffView
 from camviz_school.views.vanishing import VanishingView
@@ -235,6 +240,55 @@ def test_the_house_s_numbers_and_the_phone_s(says):
     )
     assert film.value == 35  # the film's name
     assert diagonal == np.hypot(36, 24)
+
+
+MIDDLE = np.array([433.5, 299.5])
+
+
+@pytest.fixture(scope="module")
+def read_off():
+    """The lines (2, 2, 2) that the lesson's cell has of the photograph: the floors' as x, the uprights' as z."""
+    (path,) = LESSONS.glob("18_*.ipynb")
+    (cell,) = (cell for cell in notebooks.read(path).cells if cell.id == "building")
+    given = {line.split(" = ")[0]: line for line in cell.source.splitlines() if " = [" in line}
+    typed = (given[name].partition(" = ")[2].partition("#")[0].strip() for name in ("floors", "uprights"))
+    return dict(zip("xz", (np.array(ast.literal_eval(lines), dtype=float) for lines in typed), strict=True))
+
+
+def test_a_real_photograph(says, read_off):
+    f = focal(read_off, MIDDLE)
+    lens, film = says("The field of view is that of a lens of 50 mm on film 36 mm wide")
+    assert lens.about(f * film.value / 868, within=0.02)
+    rng, found = np.random.default_rng(1), []
+    for _ in range(1000):
+        noisy = {name: both + rng.normal(0, 0.5, both.shape) for name, both in read_off.items()}
+        found.append(focal(noisy, MIDDLE))
+    (percent,) = says("Still f scatters by some 3 % only")
+    assert percent == 100 * np.std(found) / f
+
+
+def test_the_lines_of_the_photograph_are_those_that_opencv_finds_in_it(read_off):
+    """A line segment detector's edges, some ninety of both directions, give the same focal length."""
+    try:
+        path = sample("building.jpg")
+    except SampleUnavailable as reason:
+        pytest.skip(str(reason))
+    segments = cv2.createLineSegmentDetector().detect(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE))[0].reshape(-1, 2, 2)
+    across = segments[:, 1] - segments[:, 0]
+    angle, length = np.degrees(np.arctan2(across[:, 1], across[:, 0])) % 180, np.linalg.norm(across, axis=1)
+    uprights = segments[(abs(angle - 90) < 8) & (length > 40)]
+    floors = segments[(abs(angle - 159) < 19) & (length > 60) & (segments[:, 0, 1] < 480)]
+    along, up = (common_point((both - MIDDLE) / 500) * 500 for both in (floors, uprights))
+    assert np.sqrt(-(along @ up)) == pytest.approx(focal(read_off, MIDDLE), rel=0.03)
+
+
+def common_point(segments):
+    """Where the lines through segments (n, 2, 2) meet, by least squares with their lengths as weights."""
+    ends = np.concatenate([segments, np.ones((len(segments), 2, 1))], axis=2)
+    lines = np.cross(ends[:, 0], ends[:, 1])
+    lines *= (np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1) / np.linalg.norm(lines[:, :2], axis=1))[:, None]
+    x, y, w = np.linalg.svd(lines)[2][-1]
+    return np.array([x, y]) / w
 
 
 def test_a_corner_through_two_lenses(says):

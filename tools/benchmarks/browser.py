@@ -40,6 +40,13 @@ LATER = [
     ("image_sensor", "ImageSensorView", "exposure_ms", 0.1, 100.0),
     ("readout", "ReadoutView", "time", 0.0, 100.0),
     ("noise", "PhotonTransferView", "exposure", -10.0, 3.0),
+    ("vanishing", "VanishingView", "turn_deg", -25.0, 42.0),
+    ("vanishing", "VanishingView", "aside", -3.0, 2.0),
+    ("staff", "StaffView", "distance_m", 5.0, 40.0),
+    ("mosaic", "MosaicView", "turn", 0.0, 30.0),
+    ("mosaic", "MosaicView", "step", 0.0, 0.6),
+    ("three_views", "ThreeViews", "length", 0.4, 2.6),
+    ("three_views", "ThreeViews", "scale", 0.2, 0.8),
 ]
 DRAGS = 3
 COLUMNS = ("median ms", "p95 ms", "drag fps", "settled ms")
@@ -62,8 +69,9 @@ def notebook(renderer: str) -> nbformat.NotebookNode:
 
 
 def notebook_of_later_views() -> nbformat.NotebookNode:
-    """An explorer for each row of LATER, as wireframes."""
-    cells = ["import os\nos.environ['CAMVIZ_RENDERER'] = 'wire'\nfrom camviz.widgets import explore"]
+    """The smallest widget, then an explorer for each row of LATER, as wireframes."""
+    start = f"import os, sys\nos.environ['CAMVIZ_RENDERER'] = 'wire'\nsys.path.append({str(HERE)!r})\n"
+    cells = [start + "from camviz.widgets import explore\nfrom smallest import Smallest\nSmallest()"]
     for module, view, *_ in LATER:
         cells.append(f"from camviz_school.views.{module} import {view}\nexplore({view}())")
     return _notebook(cells)
@@ -127,9 +135,12 @@ def report(open_notebook: Notebook, renderer: str, changes: int, memory: int) ->
 
 
 def report_later(open_notebook: Notebook, changes: int) -> str:
-    """The table of LATER."""
+    """The table of LATER, and the smallest widget's row before it."""
     _run(open_notebook)
-    rows = []
+    smallest = open_notebook.page.query_selector(".camviz-smallest")
+    smallest.scroll_into_view_if_needed()
+    floor = measured(open_notebook, [smallest, ["x", 0.0, 100.0]], "explorer", changes)
+    rows = [["the smallest widget", "x", *(f"{value:.0f}" for value in floor)]]
     explorers = open_notebook.page.query_selector_all(".camviz-explorer")
     for (_, view, *slider), explorer in zip(LATER, explorers, strict=True):
         explorer.scroll_into_view_if_needed()
