@@ -8,10 +8,12 @@ import pytest
 from quoting import LESSONS
 from scipy.linalg import rq
 
+from camviz.cameras import Camera
+from camviz.poses import RigidTransform, Rotation
 from camviz_school.course import notebooks
 from camviz_school.course.exercises import exercise
 from camviz_school.samples import SampleUnavailable, sample
-from camviz_school.views.house import DOOR, EYE, camera, edges
+from camviz_school.views.house import DOOR, EYE, HEADING_DEG, camera, edges
 from camviz_school.views.staff import StaffView
 from camviz_school.views.vanishing import VanishingView
 
@@ -289,6 +291,24 @@ def common_point(segments):
     lines *= (np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1) / np.linalg.norm(lines[:, :2], axis=1))[:, None]
     x, y, w = np.linalg.svd(lines)[2][-1]
     return np.array([x, y]) / w
+
+
+def test_the_horizon_tells_how_the_camera_stood(says):
+    """A camera that was turned, tilted and rolled, and OpenCV's pixels of both walls' directions, far away."""
+    says("The horizon is the line through both points.")
+    says("How far it is below the middle of the picture tells the tilt, and how much it slopes tells the roll.")
+    for turn, tilt, roll in [(0, 3, 0), (6, -5, 4), (-8, 9, -6)]:
+        turned = Rotation.from_euler("YXZ", [HEADING_DEG + turn, tilt, -roll], degrees=True)
+        placed = Camera(camera().intrinsics, world_from_cam=RigidTransform.from_components(np.zeros(3), turned))
+        first, second = by_opencv(placed, [(-1e9, 0, 0), (0, 0, 1e9)])
+        f, middle = placed.intrinsics.fx, np.array([placed.intrinsics.cx, placed.intrinsics.cy])
+        slope = (second[1] - first[1]) / (second[0] - first[0])
+        assert slope == pytest.approx(np.tan(np.radians(roll)), abs=1e-6)
+        h = first[1] + slope * (middle[0] - first[0]) - middle[1]
+        assert h * np.cos(np.radians(roll)) / f == pytest.approx(np.tan(np.radians(tilt)), abs=1e-6)
+        aside = (middle - first) @ np.array([np.cos(np.radians(roll)), np.sin(np.radians(roll))])
+        d = f / np.cos(np.radians(tilt))
+        assert np.degrees(np.arctan(aside / d)) == pytest.approx(90 + HEADING_DEG + turn, abs=1e-4)
 
 
 def test_a_corner_through_two_lenses(says):
