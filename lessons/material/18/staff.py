@@ -20,8 +20,8 @@ from camviz.views.yours import is_unwritten, tried
 from camviz_school.views.house import DOOR, DOOR_EDGE, EYE, HEIGHT, WIDTH, camera, photographed
 
 _X = 0.6  # of the staff, metres to the right of the camera
-_PANEL = image_panel("picture", 120, 34, 380, WIDTH, HEIGHT)
-_WIDE = {"picture": 620, "numbers": 240}
+_PANEL = image_panel("picture", 20, 34, 380, WIDTH, HEIGHT)
+_WIDE = {"picture": 430, "numbers": 240}
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ class StaffView(View):
         problem = self._answer[1] if self.yours else ""
         said = "yours appears here, beside the staff" if is_unwritten(problem) else problem
         shown = _PANEL.show(content, title=f"A staff of {self.staff_m:g} m, {self.distance_m:g} m away")
-        return shown + svg.paragraph((120, _PANEL.y + _PANEL.height + 20), said, _PANEL.width)
+        return shown + svg.paragraph((_PANEL.x, _PANEL.y + _PANEL.height + 20), said, _PANEL.width)
 
     def _numbers_column(self, cell: Cell) -> str:
         column = readout(self.numbers(), (cell[0] + 10, 54), (0, 40), (0, 17))
@@ -135,6 +135,6 @@ def _measured(ends: Array, colour: str, words: str, class_: str = "label") -> st
     at = _PANEL.place(ends)
     aside, side = (-10, "end") if class_ == "orange" else (10, "")  # on the left where the picture soon ends
     name = svg.text(
-        np.clip(at.mean(axis=0) + (aside, 26), 16, (520, _PANEL.height - 10)), words, f"{class_} halo {side}"
+        np.clip(at.mean(axis=0) + (aside, 26), 16, (_PANEL.width - 60, _PANEL.height - 10)), words, f"{class_} halo {side}"
     )
     return marks.on_photograph([at], f"{colour} thick") + svg.dots(at, colour, 9) + name

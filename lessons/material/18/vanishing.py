@@ -216,7 +216,9 @@ class VanishingView(View):
             content += svg.line([eye, panel.place((0, 0))], "muted dashed") + svg.dots([eye], "ink", 10)
             content += svg.text(eye + (0, 20), "eye", "label halo middle")
             content += svg.text(eye + (0, 38), f"{deep:.0f} px before the picture", "label halo middle")
-        shown = panel.show(content, title="From above", note="" if np.isfinite(f) else "no right angle here")
+        else:
+            content += svg.text(panel.place((0, 500)), "f is not known here", "label middle")
+        shown = panel.show(content, title="From above")
         return shown + svg.text((x + 14, panel.y + panel.height + 17), "black: the picture; colours: the walls", "note")
 
     def _numbers_column(self, cell: Cell) -> str:
