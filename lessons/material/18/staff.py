@@ -134,7 +134,6 @@ def _measured(ends: Array, colour: str, words: str, class_: str = "label") -> st
     """A line from foot to top (2, 2) in pixels with a dot at either end, and words on its right."""
     at = _PANEL.place(ends)
     aside, side = (-10, "end") if class_ == "orange" else (10, "")  # on the left where the picture soon ends
-    name = svg.text(
-        np.clip(at.mean(axis=0) + (aside, 26), 16, (_PANEL.width - 60, _PANEL.height - 10)), words, f"{class_} halo {side}"
-    )
+    place = np.clip(at.mean(axis=0) + (aside, 26), 16, (_PANEL.width - 60, _PANEL.height - 10))
+    name = svg.text(place, words, f"{class_} halo {side}")
     return marks.on_photograph([at], f"{colour} thick") + svg.dots(at, colour, 9) + name
