@@ -57,6 +57,16 @@ def test_where_there_is_no_focal_length_the_numbers_say_why(state, reason):
     assert "nan" not in view.figure(draft=True).body.lower()
 
 
+def test_the_horizon_is_there_while_a_point_is_at_infinity_and_not_where_a_wall_is_unseen():
+    squarely = VanishingView(aside=-3.0, turn_deg=42.0)
+    assert np.isnan(squarely.pixels["x"]).all()
+    assert squarely.horizon == pytest.approx((239.5, 0.0), abs=1e-6)
+    assert squarely.numbers()["blue lines meet"] == "at infinity"
+    unseen = VanishingView(turn_deg=42.0)
+    assert np.isnan(unseen.horizon).all()
+    assert unseen.numbers()["blue lines meet"] == "not in the picture"
+
+
 @pytest.mark.parametrize("view", [VanishingView, StaffView])
 def test_a_wrong_name_of_a_panel_is_refused(view):
     with pytest.raises(ValueError, match="panels must be"):

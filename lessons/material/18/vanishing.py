@@ -84,10 +84,15 @@ class VanishingView(View):
 
     @property
     def horizon(self) -> tuple[float, float]:
-        """Its row in the middle column, and its slope; NaN without both points."""
-        (u, v), (s, t) = self.pixels["x"], self.pixels["z"]
-        slope = (t - v) / (s - u) if s != u else np.nan
-        return v + slope * (self._centre[0] - u), slope
+        """Its row in the middle column, and its slope: through both points, or through the one that is not at infinity
+        along the other's parallel lines; NaN where a wall is not seen."""
+        a, b, c = np.cross(*(self._direction(name) for name in "xz"))
+        return (-(a * self._centre[0] + c) / b, -a / b) if b else (np.nan, np.nan)
+
+    def _direction(self, name: str) -> Array:
+        """Where both lines meet, in homogeneous coordinates (3,): the third is 0 where they are parallel."""
+        at, line = self.pixels[name], self.lines[name][0]
+        return np.append(at, 1.0) if np.isfinite(at).all() else np.append(line[1] - line[0], 0.0)
 
     @property
     def below(self) -> float:
@@ -107,14 +112,17 @@ class VanishingView(View):
     def numbers(self) -> dict[str, str]:
         """The state's key figures, as text."""
         places = {n: f"({decimal(u, 0)}, {decimal(v, 0)})" for n, (u, v) in self.pixels.items() if np.isfinite(u)}
-        found = {f"{_COLOURS[name]} lines meet": places.get(name, "at infinity") for name in self.lines}
+        seen = {name: np.isfinite(both).all() for name, both in self.lines.items()}
+        found = {
+            f"{_COLOURS[name]} lines meet": places.get(name, "at infinity" if seen[name] else "not in the picture")
+            for name in seen
+        }
         own = {"the camera's own": f"{self.camera.intrinsics.fx:.1f} px"}
         if np.isfinite(self.focal):
             return found | {"focal length": f"{self.focal:.1f} px"} | own | {"tilt": f"{decimal(self.tilt, 1)}°"}
         reason = "no right angle fits"
         if any(np.isnan(self.pixels[name]).any() for name in "xz"):
-            unseen = any(np.isnan(self.lines[name]).any() for name in "xz")
-            reason = "a wall is not seen" if unseen else "a point is at infinity"
+            reason = "a point is at infinity" if seen["x"] and seen["z"] else "a wall is not seen"
         return found | {"focal length": f"none: {reason}"} | own
 
     def description(self) -> str:
