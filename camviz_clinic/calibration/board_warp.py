@@ -116,4 +116,3 @@ def with_board_warp(flat: Solution, board_warp: str, settled: Callable[[Solution
     """The solution with a bent board, always or where it earns its place, found by `settled`; else `flat` as it is."""
     wanted = board_warp == "on" or (board_warp == "auto" and earns_its_place(flat))
     return settled(replace(flat, warp=np.zeros(2))) if wanted else flat
-

@@ -16,7 +16,7 @@ from camviz_clinic.calibration.types import Board, Mask
 from camviz_clinic.calibration.uncertainty import mean_deviation, projection_covariance
 
 FEWEST_VIEWS = 3  # in each half
-ROUGHLY = 1e-5  # of the sum of squares: what a step must promise where four digits of an error are enough
+ROUGHLY = 1e-8  # of the sum of squares: what a step must promise where four digits of an error are enough
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,9 +146,7 @@ def held_out_rms(adjustment: Adjustment, folds: int) -> float:
     return float(np.sqrt(total / count)) if count else inf
 
 
-def _folds(
-    adjustment: Adjustment, folds: int | None, settled: float = SETTLED
-) -> list[tuple[np.ndarray, Adjustment]]:
+def _folds(adjustment: Adjustment, folds: int | None, settled: float = SETTLED) -> list[tuple[np.ndarray, Adjustment]]:
     """Pairs of held-out views and the solution from the others."""
     views = np.arange(adjustment.views)
     if folds is None:

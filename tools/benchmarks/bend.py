@@ -70,7 +70,8 @@ def virtual(kind: str, number: int) -> tuple[bool, np.ndarray, np.ndarray]:
     (corners,) = set_up.observed(rng)
     views = detections(set_up.camera, change(corners, set_up, rng))
     flat, auto, bent = (calibrate(views, set_up.board, board_warp=word) for word in ("off", "auto", "on"))
-    assert bent.board_warp is not None and bent.board_warp_covariance is not None
+    assert bent.board_warp is not None
+    assert bent.board_warp_covariance is not None
     ratios = (bent.board_warp - warp) / np.sqrt(np.diag(bent.board_warp_covariance))
     focal = np.array([one.cameras["camera"].intrinsics.fx for one in (flat, auto, bent)])
     return auto.board_warp is not None, ratios, 100 * (focal / set_up.camera.intrinsics.fx - 1)
