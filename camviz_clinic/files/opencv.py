@@ -11,6 +11,7 @@ import numpy as np
 
 from camviz.cameras import Camera
 from camviz.lenses import BrownConrady, KannalaBrandt, Lens, UnifiedSphere
+from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.denominator_prior import DenominatorPrior
 from camviz_clinic.calibration.stamp import LONGEST, Stamp

@@ -82,9 +82,7 @@ def calibrate_rig(
             raise CannotCalibrate(f"{name}: {error}") from error
         by_camera[name] = spread_out(own, [number[place] for place in each.places], len(frames))
     start = begun(by_camera, board)
-    solved = with_board_warp(
-        _robust(start) if robust else _settled(start), board_warp, _robust if robust else _settled
-    )
+    solved = with_board_warp(_robust(start) if robust else _settled(start), board_warp, _robust if robust else _settled)
     return _calibration(solved, detections, frames)
 
 

@@ -1,6 +1,6 @@
 """When the board's bend is solved for, how near it comes to the truth, and what it is worth, beside mrcal.
 
-    python tools/benchmarks/bend.py [COUNT]         virtual boards, flat and bent: two Markdown tables (default: 50 of each)
+    python tools/benchmarks/bend.py [COUNT]         virtual boards, flat and bent: a table (default: 50 of each)
     python tools/benchmarks/bend.py --sets NAME …   sets of field.toml, from the pictures in CAMVIZ_FIELD
 
 Virtual: the bend of a board has a random direction (along its rows, its columns, or between) and the length given, in
