@@ -79,6 +79,7 @@ def calibrations(draw):
             name: draw(arrays(float, (len(estimated), len(estimated)), elements=numbers)) for name in names
         },
         board_warp=draw(st.none() | arrays(float, 2, elements=st.floats(-0.01, 0.01))),
+        board_warp_covariance=draw(st.none() | arrays(float, (2, 2), elements=st.floats(0, 1))),
         skipped=tuple(draw(st.lists(st.tuples(words, words), max_size=2))),
     )
 
@@ -104,3 +105,4 @@ def test_nothing_of_a_calibration_is_lost_in_its_file(tmp_path_factory, calibrat
         assert back.cameras[name].lens == calibration.cameras[name].lens
         assert back.cameras[name].intrinsics == calibration.cameras[name].intrinsics
     np.testing.assert_array_equal(back.board_warp, calibration.board_warp)
+    np.testing.assert_array_equal(back.board_warp_covariance, calibration.board_warp_covariance)

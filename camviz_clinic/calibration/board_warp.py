@@ -1,14 +1,24 @@
-"""Whether the board was flat: an F-test of two more parameters, its sagittas."""
+"""Whether the board was flat: F-tests of two more parameters, its sagittas, over corners and over views."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from scipy.special import fdtrc
 
 from camviz.lenses.base import Array
 from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.cross_validation import held_out_rms
+from camviz_clinic.calibration.regularisation import regularised
+
+BOARD_WARP = ("off", "auto", "on")  # solved for never, where it earns its place, always
+FALSE_ALARMS = 0.01  # the share of flat boards of which the views alone would say that they are bent
+FEWEST_VIEWS = 6  # with fewer, the scatter of the views is a guess
+FOLDS = 5
+Solution = TypeVar("Solution", bound=Adjustment)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,3 +70,49 @@ def warp_test(adjustment: Adjustment) -> WarpTest:
         raise ValueError(f"more than {bent.unknowns} measurements are needed, got {bent.measurements}")
     statistic = (flat.sum_of_squares - bent.sum_of_squares) / 2 / (bent.sum_of_squares / spare)
     return WarpTest(flat, bent, statistic, float(fdtrc(2, spare, max(statistic, 0.0))))
+
+
+def probability_by_views(adjustment: Adjustment) -> float:
+    """How often the views of a flat board agree on a bend as clearly as these do.
+
+    The corners of a view are off together, so that views are the independent samples and not corners. With the two
+    sagittas w and their covariance V by the scatter of n views, F = wᵀ V⁻¹ w (n - 2)/(2 (n - 1)) is distributed as
+    F(2, n - 2) when the board is flat. It takes one step to the least sum of squares, from a flat board or a bent one.
+    1 with fewer than six views that have a say. Source: Hotelling (1931), "The generalization of Student's ratio".
+    """
+    views = int(adjustment.posed.sum())
+    if views < FEWEST_VIEWS:
+        return 1.0
+    bent = adjustment if adjustment.warp is not None else replace(adjustment, warp=np.zeros(2))
+    assert bent.warp is not None
+    place = bent.warp_place
+    warp = bent.warp + bent.normal_equations.solution()[0][place]
+    statistic = warp @ np.linalg.solve(bent.covariance[place, place], warp) * (views - 2) / (2 * (views - 1))
+    return float(fdtrc(2, views - 2, statistic)) if np.isfinite(statistic) else 1.0
+
+
+def earns_its_place(flat: Adjustment) -> bool:
+    """Whether a bend of the board is to be solved for, beside a solution with a flat one.
+
+    The views must agree on a bend as those of one flat board in a hundred would, and the bend must foretell the corners
+    of views that were held out better than a flat board does.
+    """
+    if not probability_by_views(flat) < FALSE_ALARMS:
+        return False
+    try:
+        bent = regularised(replace(flat, warp=np.zeros(2)))
+        return probability_by_views(bent) < FALSE_ALARMS and held_out_rms(bent, FOLDS) < held_out_rms(flat, FOLDS)
+    except (ValueError, np.linalg.LinAlgError):  # fewer views give no camera, or one that folds at a corner
+        return False
+
+
+def check_board_warp(word: str) -> None:
+    """Raises ValueError for what is none of BOARD_WARP."""
+    if word not in BOARD_WARP:
+        raise ValueError(f"board_warp must be one of {', '.join(BOARD_WARP)}, got {word!r}")
+
+
+def with_board_warp(flat: Solution, board_warp: str, settled: Callable[[Solution], Solution]) -> Solution:
+    """The solution with a bent board, always or where it earns its place, found by `settled`; else `flat` as it is."""
+    wanted = board_warp == "on" or (board_warp == "auto" and earns_its_place(flat))
+    return settled(replace(flat, warp=np.zeros(2))) if wanted else flat

@@ -10,12 +10,13 @@ from numpy.typing import ArrayLike
 from scipy.special import chdtrc
 
 from camviz.lenses.base import Array
-from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.adjustment import SETTLED, Adjustment
 from camviz_clinic.calibration.difference import Difference, difference, pixel_grid
 from camviz_clinic.calibration.types import Board, Mask
 from camviz_clinic.calibration.uncertainty import mean_deviation, projection_covariance
 
 FEWEST_VIEWS = 3  # in each half
+ROUGHLY = 1e-8  # of the sum of squares: what a step must promise where four digits of an error are enough
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,18 +124,29 @@ def held_out(adjustment: Adjustment, *, folds: int | None = None, camera: str | 
     shape = (4, adjustment.views, len(adjustment.corners), 2)
     residuals, variances = np.full(shape, np.nan), np.full(shape, np.nan)
     for views, solution in _folds(adjustment, folds):
-        asked = adjustment.only(views)
-        if folds:
-            asked = replace(asked, cameras=solution.cameras, warp=solution.warp)
+        asked = _asked(adjustment, views, solution if folds else adjustment)
         for i, half in enumerate(board_halves(adjustment.board)):
-            there = asked.using({each: mask & half for each, mask in asked.used.items()}).refined(only_poses=True)
+            there = _posed_by(half, asked)
             scored = asked.used[name] & ~half & there.posed[:, None]
             residuals[i, views] = np.where(scored[..., None], there.residuals[name], np.nan)
             variances[i, views] = np.where(scored[..., None], _predicted_variances(there, solution, name), np.nan)
     return HeldOut(residuals, variances)
 
 
-def _folds(adjustment: Adjustment, folds: int | None) -> list[tuple[np.ndarray, Adjustment]]:
+def held_out_rms(adjustment: Adjustment, folds: int) -> float:
+    """The RMS of `held_out` with so many folds, over all cameras together, in pixels to four digits."""
+    total, count = 0.0, 0
+    for views, solution in _folds(adjustment, folds, ROUGHLY):
+        asked = _asked(adjustment, views, solution)
+        for half in board_halves(adjustment.board):
+            there = _posed_by(half, asked, settled=ROUGHLY)
+            for name in adjustment.cameras:
+                scored = there.residuals[name][asked.used[name] & ~half & there.posed[:, None]]
+                total, count = total + float(np.sum(scored**2)), count + len(scored)
+    return float(np.sqrt(total / count)) if count else inf
+
+
+def _folds(adjustment: Adjustment, folds: int | None, settled: float = SETTLED) -> list[tuple[np.ndarray, Adjustment]]:
     """Pairs of held-out views and the solution from the others."""
     views = np.arange(adjustment.views)
     if folds is None:
@@ -142,7 +154,18 @@ def _folds(adjustment: Adjustment, folds: int | None) -> list[tuple[np.ndarray, 
     if not 2 <= folds <= adjustment.views:
         raise ValueError(f"folds must be between 2 and the number of views, {adjustment.views}, got {folds}")
     parts = [views[start::folds] for start in range(folds)]
-    return [(part, adjustment.only(np.setdiff1d(views, part)).refined()) for part in parts]
+    return [(part, adjustment.only(np.setdiff1d(views, part)).refined(settled=settled)) for part in parts]
+
+
+def _asked(adjustment: Adjustment, views: ArrayLike, solution: Adjustment) -> Adjustment:
+    """Some views of a problem before the cameras and with the board of a solution."""
+    return replace(adjustment.only(views), cameras=solution.cameras, warp=solution.warp)
+
+
+def _posed_by(half: Mask, asked: Adjustment, settled: float = SETTLED) -> Adjustment:
+    """The views with poses from the corners (corners,) of one half of the board."""
+    used = {name: mask & half for name, mask in asked.used.items()}
+    return asked.using(used).refined(only_poses=True, settled=settled)
 
 
 def board_halves(board: Board) -> list[Mask]:

@@ -145,6 +145,12 @@ class Linearisation(Problem):
         place = self.intrinsics_of(name)
         return self.covariance[place, place]
 
+    @property
+    def warp_covariance(self) -> Array | None:
+        """Of the board's two sagittas, (2, 2) in metres squared; None for a flat board."""
+        place = self.warp_place
+        return None if place is None else self.covariance[place, place]
+
     @cached_property
     def pose_covariance(self) -> Array:
         """Of every view's twist, (views, 6, 6), radians and metres; NaN for a view without a say.

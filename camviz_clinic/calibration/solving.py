@@ -13,6 +13,7 @@ from camviz.cameras import Camera
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.board_warp import check_board_warp, with_board_warp
 from camviz_clinic.calibration.detection import CannotCalibrate, Detections, seen
 from camviz_clinic.calibration.jacobian import with_parameters
 from camviz_clinic.calibration.models import MODELS, CameraModel, Views, poses_from_rays
@@ -38,7 +39,13 @@ FOLDED = (
 
 
 def calibrate(
-    detections: Detections, board: Board, model: str = "standard", *, fixed: Sequence[str] = (), robust: bool = True
+    detections: Detections,
+    board: Board,
+    model: str = "standard",
+    *,
+    fixed: Sequence[str] = (),
+    robust: bool = True,
+    board_warp: str = "off",
 ) -> Calibration:
     """The camera that saw a board in at least three views.
 
@@ -49,12 +56,14 @@ def calibrate(
         fixed: Parameters that are not solved for: the principal point (cx, cy) stays in the middle of the image, all
             others stay 0.
         robust: Set aside corners and views that the rest contradicts: see `camviz_clinic.calibration.outliers`.
+        board_warp: {"off", "auto", "on"}, whether the board's bend is solved for with everything else, as mrcal solves
+            for its calobject_warp: never, where it earns its place (`earns_its_place`), or always.
 
     Returns: Calibration with one camera, named "camera".
 
     Raises:
         CannotCalibrate: Where the views do not give a camera.
-        ValueError: For an unknown model or parameter, and for corners of another board.
+        ValueError: For an unknown model, parameter or `board_warp`, and for corners of another board.
 
     >>> from camviz_clinic.checks import virtual
     >>> rng = np.random.default_rng(1)
@@ -64,7 +73,9 @@ def calibrate(
     True
     """
     kind, estimated = _model(model, fixed)
+    check_board_warp(board_warp)
     adjustment = _alone("camera", detections, board, kind, estimated, robust)
+    adjustment = with_board_warp(adjustment, board_warp, _robust if robust else _settled)
     return _calibration(adjustment, {"camera": detections}, detections.skipped, _stopped_short(adjustment))
 
 
@@ -77,6 +88,7 @@ def calibrate_pair(
     fixed: Sequence[str] = (),
     robust: bool = True,
     joint: bool = True,
+    board_warp: str = "off",
 ) -> Calibration:
     """The cameras of a pair, from the views that both have; the left one's frame is the world.
 
@@ -91,12 +103,13 @@ def calibrate_pair(
         robust: Set aside what the rest contradicts, as of `calibrate`.
         joint: Otherwise each camera stays as it is when calibrated alone, and only the poses are solved for (OpenCV's
             CALIB_FIX_INTRINSIC).
+        board_warp: Whether the board's bend is solved for, as of `calibrate`.
 
     Returns: Calibration with the cameras "left" and "right".
 
     Raises:
         CannotCalibrate: Where fewer than three views are common, or the views do not give a camera.
-        ValueError: For an unknown model or parameter, and for corners of another board.
+        ValueError: For an unknown model, parameter or `board_warp`, and for corners of another board.
 
     >>> from camviz_clinic.checks import virtual
     >>> rng = np.random.default_rng(1)
@@ -107,6 +120,7 @@ def calibrate_pair(
     True
     """
     kind, estimated = _model(model, fixed)
+    check_board_warp(board_warp)
     both = {"left": left, "right": right}
     places = sorted(set(left.places) & set(right.places))
     if len(places) < FEWEST_VIEWS:
@@ -117,6 +131,7 @@ def calibrate_pair(
     alone = {name: _alone(name, shared[name], board, kind, estimated, robust) for name in both}
     pair = _paired(alone, board, estimated if joint else (), robust)
     pair = _robust(pair) if robust else _settled(pair)
+    pair = with_board_warp(pair, board_warp, _robust if robust else _settled)
     stopped = _stopped_short(pair)
     if not joint:
         pair = replace(pair, estimated=dict.fromkeys(both, estimated))
@@ -270,7 +285,7 @@ def _trimmed(adjustment: Adjustment, view: int) -> Adjustment:
         set_aside={},
     )
     for _ in range(TRIMMINGS):
-        alone = alone.refined()
+        alone = alone.refined(only_poses=True)
         distances = {name: np.linalg.norm(residuals, axis=-1) for name, residuals in alone.residuals.items()}
         middle = np.nanmedian(np.concatenate(list(distances.values()), axis=1))
         alone = replace(alone, set_aside={name: distance > middle for name, distance in distances.items()})
@@ -314,6 +329,8 @@ def _calibration(
         intrinsics_covariance={name: adjustment.intrinsics_covariance(name) for name in adjustment.cameras},
         skipped=skipped,
         priors=adjustment.priors,
+        board_warp=adjustment.warp,
+        board_warp_covariance=adjustment.warp_covariance,
     )
 
 

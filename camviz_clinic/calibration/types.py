@@ -167,6 +167,7 @@ class Calibration:
         intrinsics_covariance: mapping of str to (n, n), of the n parameters in `estimated`, in their units squared.
         priors: What the solution assumed beforehand.
         board_warp: (2,), sagittas in metres, see `Board.warped`.
+        board_warp_covariance: (2, 2), in metres squared.
         skipped: tuple of (str, str), pictures that were not used, and why.
         faults: What was mended in reading, where `load` was asked to mend.
         redundant: What the file says twice, in its order.
@@ -196,6 +197,7 @@ class Calibration:
     intrinsics_covariance: Mapping[str, Array] = field(default_factory=dict, repr=False)
     priors: Mapping[str, DenominatorPrior] = field(default_factory=dict)
     board_warp: Array | None = None
+    board_warp_covariance: Array | None = field(default=None, repr=False)
     skipped: tuple[tuple[str, str], ...] = ()
     faults: tuple[CalibrationError, ...] = ()
     redundant: tuple[Redundancy, ...] = ()

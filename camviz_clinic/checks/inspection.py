@@ -9,6 +9,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
+
 from camviz.cameras import Camera
 from camviz_clinic.calibration.stamp import Stamp
 from camviz_clinic.calibration.types import Board, Calibration
@@ -126,12 +128,21 @@ class Inspection:
             "verdict": self.verdict,
             **({"differences": [asdict(each) for each in self.differences]} if self.compare else {}),
             "cameras": [self._camera(name, camera) for name, camera in cameras.items()],
+            **self._board_warp(),
             "task": [asdict(each) for each in self.summary.task] if self.summary else [],
             "findings": [words.tree(finding) for finding in self.findings],
             "checked": list(self.checked),
             "skipped": [{"id": id, "why": why} for id, why in self.skipped],
             "ignored": [{"id": id, "count": count} for id, count in words.count_of_each(self.ignored).items()],
         }
+
+    def _board_warp(self) -> dict[str, Any]:
+        """The board's two sagittas and their σ in mm, where they were solved for."""
+        if self.calibration is None or self.calibration.board_warp is None:
+            return {}
+        covariance = self.calibration.board_warp_covariance
+        sigmas = None if covariance is None else (1000 * np.sqrt(np.diag(covariance))).tolist()
+        return {"board_warp": {"mm": (1000 * self.calibration.board_warp).tolist(), "sigma_mm": sigmas}}
 
     def _camera(self, name: str, camera: Camera) -> dict[str, Any]:
         grid = camera.intrinsics

@@ -22,6 +22,7 @@ GOOD = 1.0  # pixels: where the largest expected error is below this, no more pi
 UNKNOWN = "not in the file"
 MOST_CAMERAS = 4
 RMS, MIDDLE, CORNER = "RMS error", "uncertainty, centre", "uncertainty, worst corner"
+BEND = ("board's bend along rows", "board's bend along columns")
 LEGEND = "± is one standard deviation, by the scatter of the views; uncertainty: of the pixel of a far point."
 
 
@@ -137,6 +138,25 @@ class Summary:
             sigma = self.evidence.sigma_of(name, key)
             if sigma is not None or value or key in ("cx", "cy"):
                 yield key, measured(value, sigma)
+        yield from self.bend.items()
+
+    @property
+    def bend(self) -> dict[str, str]:
+        """The board's two sagittas with their ± σ in mm, as text, where the bend was solved for."""
+        warp, covariance = self.calibration.board_warp, self.calibration.board_warp_covariance
+        if warp is None:
+            return {}
+        sigmas = [None, None] if covariance is None else (1000 * np.sqrt(np.diag(covariance))).tolist()
+        told = [measured(1000 * float(sagitta), sigma) for sagitta, sigma in zip(warp, sigmas, strict=True)]
+        return dict(zip(BEND, (f"{each} mm" for each in told), strict=True))
+
+    @property
+    def bend_sentence(self) -> str:
+        """The same as a sentence; empty where the bend was not solved for."""
+        if not self.bend:
+            return ""
+        rows, columns = self.bend.values()
+        return f"The board's bend was solved for: {rows} along its rows, {columns} along its columns."
 
     @property
     def holds(self) -> tuple[str, ...]:
@@ -152,6 +172,8 @@ class Summary:
             pinhole = ", ".join(f"{key} = {rows[key]}" for key in ("fx", "fy", "cx", "cy"))
             others = "; ".join(f"{key} {rows[key]}" for key in (RMS, MIDDLE, CORNER) if rows[key] != UNKNOWN)
             yield f"{name}: {pinhole} px{'; ' * bool(others)}{others}."
+        if self.bend_sentence:
+            yield self.bend_sentence
         for each in self.task:
             yield each.sentence
 

@@ -54,9 +54,10 @@ CALIBRATE = """\
 Finds a board (a chessboard, a ChArUco board, Kalibr's AprilGrid, a grid of circles) in pictures and solves for the
 camera that took them, or with --right for a pair of cameras. IMAGES are files, folders, or patterns such as
 'left*.jpg'. Pictures without the board, of another size, or that cannot be read are named and skipped. Corners and
-whole views that contradict the rest are set aside, named, and kept in the file. What is written is OpenCV's YAML, with
-all that a later inspection needs. With --report, or where a gate is given, the calibration is inspected as well;
-findings make it fail only where there is a gate.
+whole views that contradict the rest are set aside, named, and kept in the file. The board's bend is solved for, too,
+where the views agree on it and it foretells views that were held out better. What is written is OpenCV's YAML, with all
+that a later inspection needs. With --report, or where a gate is given, the calibration is inspected as well; findings
+make it fail only where there is a gate.
 
 With --corners nothing is looked for in pictures: the corners come from files of other programs, which docs/formats.md
 lists. --board, --square-mm and --size say what those files do not hold. IMAGES are then for the report alone, and
@@ -85,6 +86,7 @@ exit status:
   3  something is missing on this machine
 """
 MOST_WORDS = 1000
+BOARD_WARP = ("auto", "on", "off")
 FINDERS = ("auto", "sectors", "classic")
 
 
@@ -110,6 +112,13 @@ def add(commands: Any) -> None:
     command.add_argument("--size", metavar="WxH", type=size, help="image size in pixels, where FILES do not hold it")
     command.add_argument("--model", choices=list(MODELS), default="standard", help="which lens (default: standard)")
     command.add_argument("--fix", metavar="NAMES", default="", help="parameters not to solve for, such as k3 or p1,p2")
+    command.add_argument(
+        "--board-warp",
+        choices=BOARD_WARP,
+        default="auto",
+        help="solve for the board's bend, as mrcal's calobject_warp: where the views agree on it, always, or never "
+        "(default: auto)",
+    )
     command.add_argument("--keep-outliers", action="store_true", help="set nothing aside")
     command.add_argument("--finder", choices=FINDERS, default="auto", help="how chessboards are found")
     command.add_argument("--workers", metavar="N", type=_count, help="processes (default: one for each processor)")
@@ -365,7 +374,8 @@ def _search(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _how(options: argparse.Namespace) -> dict[str, Any]:
-    return {"fixed": tuple(re.findall(r"[^,\s]+", options.fix)), "robust": not options.keep_outliers}
+    fixed = tuple(re.findall(r"[^,\s]+", options.fix))
+    return {"fixed": fixed, "robust": not options.keep_outliers, "board_warp": options.board_warp}
 
 
 def _remark(text: str) -> str:

@@ -105,7 +105,7 @@ def _solved(found: Detections, board: Board, options: argparse.Namespace) -> Cal
     from camviz_clinic.calibration import CannotCalibrate, calibrate
 
     try:
-        return calibrate(found, board, options.model)
+        return calibrate(found, board, options.model, board_warp="auto")
     except CannotCalibrate as error:
         named = "; ".join(f"{picture}: {why}" for picture, why in found.skipped[:3])
         raise Refusal(f"{error}{f' (skipped: {named})' if named else ''}.") from error

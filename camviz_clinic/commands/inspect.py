@@ -237,7 +237,8 @@ def _calibrated(paths: list[Path], board: Board | None, seconds: float | None) -
     from camviz_clinic.checks.inspection import inspect_board
 
     try:
-        return replace(calibrate(_detected(paths, board, seconds), board), source=paths[0].parent)
+        solved = calibrate(_detected(paths, board, seconds), board, board_warp="auto")
+        return replace(solved, source=paths[0].parent)
     except CannotCalibrate as error:
         if found := inspect_board(paths, board, paths[0].parent):
             return found

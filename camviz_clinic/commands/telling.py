@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
 def report(calibration: Calibration) -> list[str]:
     """What came out, in sentences."""
+    from camviz_clinic.checks.summary import Summary
+
     said = [f"{picture}: skipped, {why}." for picture, why in calibration.skipped]
     said += calibration.notes
     for name, camera in calibration.cameras.items():
@@ -28,6 +30,8 @@ def report(calibration: Calibration) -> list[str]:
             f"{name}: {', '.join(values)} px; RMS error {calibration.rms(name):.3f} px over {used.sum()} corners in "
             f"{views} views."
         )
+    if bend := Summary.of(calibration).bend_sentence:
+        said.append(bend)
     if "right" in calibration.cameras:
         x, y, z = 1000 * calibration.cameras["right"].centre
         length = np.sqrt(x * x + y * y + z * z)

@@ -11,6 +11,7 @@ import numpy as np
 
 from camviz.cameras import Camera
 from camviz.lenses import BrownConrady, KannalaBrandt, Lens, UnifiedSphere
+from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.denominator_prior import DenominatorPrior
 from camviz_clinic.calibration.stamp import LONGEST, Stamp
@@ -157,15 +158,24 @@ def _recorded(section: Section, tags: dict[str, str], notes: list[str]) -> dict[
         of_camera = _views(section, tag) | _solution(section, tag) | _stamp(section, tag)
         for field, value in of_camera.items():
             by_name.setdefault(field, {})[name] = value
-    warp = np.array(section.vector("board_warp", [2], "sagittas along x and y")) if "board_warp" in section else None
-    if warp is not None:
-        warp.flags.writeable = False
     skipped = words(section, "skipped_pictures")
     if len(skipped) % 2:
         raise section.error("skipped_pictures", "pairs of a picture and a reason", f"{len(skipped)} words")
     pairs = tuple(zip(skipped[::2], skipped[1::2], strict=True))
     said = (*notes, *words(section, "notes"))
-    return by_name | {"board": _board(section), "board_warp": warp, "skipped": pairs, "notes": said}
+    return by_name | _warp(section) | {"board": _board(section), "skipped": pairs, "notes": said}
+
+
+def _warp(section: Section) -> dict[str, Array]:
+    """The board's two sagittas and their covariance, where the file has them."""
+    values = {}
+    if "board_warp" in section:
+        values["board_warp"] = np.array(section.vector("board_warp", [2], "sagittas along x and y"))
+    if "board_warp_covariance" in section:
+        values["board_warp_covariance"] = section.matrix("board_warp_covariance", 2, 2)
+    for array in values.values():
+        array.flags.writeable = False
+    return values
 
 
 def words(section: Section, key: str) -> tuple[str, ...]:

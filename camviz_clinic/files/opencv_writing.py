@@ -81,6 +81,8 @@ def _recorded(calibration: Calibration) -> dict[str, Any]:
             values["board_kind"] = board.kind
     if calibration.board_warp is not None:
         values["board_warp"] = np.reshape(calibration.board_warp, (1, 2))
+    if calibration.board_warp_covariance is not None:
+        values["board_warp_covariance"] = np.ascontiguousarray(calibration.board_warp_covariance)
     if calibration.skipped:
         values["skipped_pictures"] = [word for picture_and_why in calibration.skipped for word in picture_and_why]
     return values | ({"notes": list(calibration.notes)} if calibration.notes else {})

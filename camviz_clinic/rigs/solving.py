@@ -10,6 +10,7 @@ import numpy as np
 
 from camviz.cameras import Camera
 from camviz.lenses.base import Array
+from camviz_clinic.calibration.board_warp import check_board_warp, with_board_warp
 from camviz_clinic.calibration.detection import CannotCalibrate, Detections, seen
 from camviz_clinic.calibration.outliers import Masks
 from camviz_clinic.calibration.regularisation import regularised
@@ -32,6 +33,7 @@ def calibrate_rig(
     held: Mapping[str, Camera] | None = None,
     fixed: Sequence[str] = (),
     robust: bool = True,
+    board_warp: str = "off",
 ) -> Calibration:
     """The cameras of a rig of which each saw the board in any of the frames; the first one's frame is the world.
 
@@ -46,13 +48,15 @@ def calibrate_rig(
         held: Cameras by name whose intrinsics and lens are known and not solved for; their poses do not count.
         fixed: Parameters that are not solved for, as of `calibrate`.
         robust: Set aside corners and views that the rest contradicts, by a σ for each camera.
+        board_warp: Whether the board's bend is solved for, as of `calibrate`.
 
     Returns: Calibration with these cameras in place. Its covariances are clustered by frame
         (`RigAdjustment.covariance`); `relative_pose` gives those of the places.
 
     Raises:
         CannotCalibrate: Where the frames do not tie all cameras together, or a camera's views do not give a camera.
-        ValueError: For fewer than two cameras, an unknown name, model or parameter, and corners of another board.
+        ValueError: For fewer than two cameras, an unknown name, model, parameter or `board_warp`, and corners of
+            another board.
 
     Source: Triggs, McLauchlan, Hartley & Fitzgibbon (2000), "Bundle adjustment: a modern synthesis".
 
@@ -66,6 +70,7 @@ def calibrate_rig(
     """
     names, held = list(detections), dict(held or {})
     _check(detections, board, model, held)
+    check_board_warp(board_warp)
     models = {name: model if isinstance(model, str) else model[name] for name in names}
     frames = sorted({place for each in detections.values() for place in each.places})
     number = {place: row for row, place in enumerate(frames)}
@@ -77,7 +82,7 @@ def calibrate_rig(
             raise CannotCalibrate(f"{name}: {error}") from error
         by_camera[name] = spread_out(own, [number[place] for place in each.places], len(frames))
     start = begun(by_camera, board)
-    solved = _robust(start) if robust else _settled(start)
+    solved = with_board_warp(_robust(start) if robust else _settled(start), board_warp, _robust if robust else _settled)
     return _calibration(solved, detections, frames)
 
 
@@ -166,6 +171,8 @@ def _calibration(adjustment: RigAdjustment, detections: Mapping[str, Detections]
         intrinsics_covariance={name: covariance[place, place] for name, place in places.items()},
         skipped=tuple(one for each in detections.values() for one in each.skipped),
         priors=adjustment.priors,
+        board_warp=adjustment.warp,
+        board_warp_covariance=adjustment.warp_covariance,
     )
 
 

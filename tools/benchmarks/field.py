@@ -114,7 +114,7 @@ def _size(path: Path) -> str:
 
 def by_camviz(detections: Detections, board: Board, model: str) -> Camera:
     """`camviz calibrate` as it comes."""
-    return calibrate(detections, board, model).cameras["camera"]
+    return calibrate(detections, board, model, board_warp="auto").cameras["camera"]
 
 
 def by_opencv(detections: Detections, board: Board, model: str) -> Camera:

@@ -104,7 +104,7 @@ def lens_too_rich(rng: Rng, strength: float) -> Evidence:
     view="board-residuals",
     symptom="The residuals are bowed across the board.",
     causes=("a board that is not flat: paper on cardboard, or a sheet that hangs",),
-    remedy="Mount the board on glass or aluminium, or solve for its warp as well.",
+    remedy="Mount the board on glass or aluminium, or solve for its bend as well (--board-warp on).",
     threshold="Noise would show the bend in one set of a million, "
     "and it is at least half a percent of the board's longer side.",
     explains=(
