@@ -49,6 +49,7 @@ def main(words):
         os.environ.setdefault("CAMVIZ_SAMPLES", str(SAMPLES))
     set_up(special or ("light" if light else "reader"))
     if special == "test":
+        os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # else each worker and each command compiles the house again
         return run(PYTHON, *TESTS, *words[1:], cwd=ROOT)
     if special == "site":
         return run(PYTHON, ROOT / "tools/website/build.py", *words[1:], cwd=ROOT)

@@ -38,7 +38,7 @@ class House:
 
     def run(self, *arguments: str, status: int = 0) -> str:
         """What `python ARGUMENTS` prints there."""
-        environment = {**os.environ, "PYTHONPATH": str(self.root), "PYTHONDONTWRITEBYTECODE": "1"}
+        environment = {**os.environ, "PYTHONPATH": str(self.root)}
         done = subprocess.run(
             [sys.executable, *arguments], cwd=self.root, env=environment, capture_output=True, text=True, check=False
         )
@@ -58,11 +58,13 @@ def house(folder: Path) -> House:
     """A copy of the repository in a folder that is not there yet."""
     for name in COPIED:
         if (ROOT / name).is_dir():
-            shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", ".ipynb*"))
+            shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns(".ipynb*"))
         else:
             shutil.copyfile(ROOT / name, folder / name)
     return House(folder, _files(folder))
 
 
 def _files(folder: Path) -> dict[str, bytes]:
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    """Each file's bytes; what Python compiled them to, which each run there leaves to the next, does not count."""
+    files = (path for path in folder.rglob("*") if path.is_file() and path.suffix != ".pyc")
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}

@@ -1,10 +1,12 @@
 """The house: which part stands on which, and that no import runs back up, deferred ones included."""
 
 import ast
+import json
 import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 
 import nbformat
@@ -100,9 +102,13 @@ def named(source: str) -> set[str]:
     return names & MODULES.keys() - {"camviz"}
 
 
-GRAPH = {name: imported(path) - {name, *above(name)} for name, path in MODULES.items()}
+@cache
+def graph() -> dict[str, set[str]]:
+    """What each module imports of the others. It takes seconds, and every worker of the tests reads this file."""
+    return {name: imported(path) - {name, *above(name)} for name, path in MODULES.items()}
 
 
+@cache
 def told(number: str) -> set[str]:
     """The modules that a lesson imports itself, in its notebook or in the files beside it."""
     cells = nbformat.read(LESSONS[number], 4).cells
@@ -111,23 +117,20 @@ def told(number: str) -> set[str]:
     return named(notebook).union(*(imported(path) for path in BESIDE if path.parent.name == number))
 
 
-TOLD = {number: told(number) for number in LESSONS}
-
-
 def reached(names: Iterable[str]) -> set[str]:
     """These modules, those that they import, those that these import, and so on."""
     seen, left = set[str](), set(names)
     while left:
         seen |= left
-        left = {other for name in left for other in GRAPH[name]} - seen
+        left = {other for name in left for other in graph()[name]} - seen
     return seen
 
 
 def of_one_lesson() -> list[str]:
     """The modules of the packages that one lesson reaches, and nothing else."""
-    used = set().union(*GRAPH.values(), *TOLD.values())
+    used = set().union(*graph().values(), *map(told, LESSONS))
     shared = reached(MODULES.keys() - VIEWS.keys() - used)
-    lessons = Counter(name for names in TOLD.values() for name in reached(names))
+    lessons = Counter(name for names in map(told, LESSONS) for name in reached(names))
     return [name for name in MODULES if lessons[name] == 1 and name not in shared | VIEWS.keys()]
 
 
@@ -153,7 +156,7 @@ def test_arrows_between_the_packages_run_one_way() -> None:
     """camviz names neither of the other two, and the clinic not the school: strings that name a module count."""
     wrong = [
         f"{one} names {other}"
-        for one, others in GRAPH.items()
+        for one, others in graph().items()
         for other in others
         if STREET.index(house(other)) > STREET.index(house(one)) and one != "camviz"  # which says where old names are
     ]
@@ -169,7 +172,7 @@ def test_no_import_runs_back_up() -> None:
     } | {"camviz.__main__": (9, 9)}
     arrows = [
         (one, other)
-        for one, others in GRAPH.items()
+        for one, others in graph().items()
         for other in others
         if part(one) and part(other) and part(one) != part(other)
     ]
@@ -179,7 +182,7 @@ def test_no_import_runs_back_up() -> None:
 
 def test_no_files_import_each_other_in_a_circle() -> None:
     """A file that imports none of the others, or that none of them imports, is on no circle: take it away, again."""
-    left = dict(GRAPH)
+    left = dict(graph())
     while free := {name for name, others in left.items() if not others & left.keys() or not _importers(name, left)}:
         left = {name: others for name, others in left.items() if name not in free}
     assert sorted(left) == []
@@ -189,25 +192,43 @@ def _importers(name: str, graph: dict[str, set[str]]) -> set[str]:
     return {other for other, others in graph.items() if name in others}
 
 
+@cache
+def first_loaded_by() -> dict[str, list[str]]:
+    """The drawing and widget libraries that each part is the first to load, all parts in one fresh interpreter."""
+    modules_of = {name: [one for one in MODULES if part(one).partition(".")[2] == name] for name in WHAT_IS_TRUE}
+    code = f"""
+import importlib, json, sys
+loaded = {{}}
+for name, modules in {modules_of}.items():
+    for module in modules:
+        importlib.import_module(module)
+    loaded[name] = [one for one in {HEAVY} if one in sys.modules and one not in sum(loaded.values(), [])]
+print(json.dumps(loaded))
+"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert all(modules_of.values()), "a part without modules"
+    found: dict[str, list[str]] = json.loads(done.stdout)
+    return found
+
+
 @pytest.mark.parametrize("name", WHAT_IS_TRUE)
 def test_what_is_true_needs_nothing_that_draws(name: str) -> None:
-    """A fresh interpreter that imports all of a part has loaded no drawing or widget library."""
-    wanted = [module for module in MODULES if part(module).partition(".")[2] == name]
-    code = f"import sys, {', '.join(wanted)}; print(*[name for name in {HEAVY} if name in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout.split()) == (0, []), done.stderr
+    """A part whose modules are all imported has loaded no drawing or widget library. All are in one interpreter: where
+    none of them loads one, none does alone."""
+    assert first_loaded_by()[name] == []
 
 
 def test_no_package_imports_what_lies_beside_a_lesson() -> None:
     """camviz itself names it, which says where old names are."""
-    packages = {name: others for name, others in GRAPH.items() if name not in VIEWS and name != "camviz"}
+    packages = {name: others for name, others in graph().items() if name not in VIEWS and name != "camviz"}
     beside = {"camviz_school.views", *VIEWS}
     assert [f"{name} names {other}" for name, others in packages.items() for other in others & beside] == []
 
 
 def test_what_lies_beside_a_lesson_serves_that_lesson_and_no_other() -> None:
     home = {name: path.parent.name for name, path in VIEWS.items()}
-    used = {(name, number) for number, names in TOLD.items() for name in reached(names) & VIEWS.keys()}
+    used = {(name, number) for number in LESSONS for name in reached(told(number)) & VIEWS.keys()}
     assert used == set(home.items())
 
 

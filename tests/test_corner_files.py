@@ -86,7 +86,7 @@ def test_the_help_lists_every_format(words, capsys):
 
 
 @pytest.mark.parametrize("name", corner_formats())
-@settings(max_examples=60, deadline=None)
+@settings.get_profile("damage")
 @given(data=st.data())
 def test_whatever_is_done_to_a_file_it_is_read_or_refused_in_one_sentence(tmp_path_factory, name, data):
     example = dict(corner_formats()[name].example)

@@ -52,7 +52,7 @@ def anywhere(tmp_path_factory):
     return tmp_path_factory.mktemp("fuzz") / "camera.yml"
 
 
-FUZZ = settings(max_examples=60, deadline=None)
+FUZZ = settings.get_profile("damage")
 
 
 @pytest.mark.parametrize("original", FILES, ids=lambda path: path.name)

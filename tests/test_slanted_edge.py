@@ -119,7 +119,7 @@ def test_mtf50_is_within_three_percent_with_two_percent_noise(blur, size, angle_
     [
         ("gauss", 1.0, 5, 80, 0.02),
         pytest.param("gauss", 0.5, 2, 80, 0.02, marks=pytest.mark.thorough),
-        ("pixel", 0.0, 10, 80, 0.02),
+        pytest.param("pixel", 0.0, 10, 80, 0.02, marks=pytest.mark.thorough),
         pytest.param("disc", 3.0, 5, 80, 0.02, marks=pytest.mark.thorough),
         ("gauss", 1.0, 5, 30, 0.01),
         pytest.param("gauss", 2.0, 15, 200, 0.005, marks=pytest.mark.thorough),

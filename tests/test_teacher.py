@@ -207,6 +207,7 @@ def test_pictures_of_the_lessons_come_along(folder):
 # Sheets --------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.by_example
 @EACH
 def test_the_sheets_hold_every_exercise_and_the_quiz_and_load_nothing(path):
     number, lesson = path.name[:2], notebooks.read(path)
