@@ -77,13 +77,13 @@ class LiveInspection:
             return
         folder = None if images is None else Path(images)
         self.case = Case(inspection.calibration, inspection.compare, images=folder, largest=_LARGEST)
-        wide, narrow = Layout(width="28em", max_width="100%"), Layout(max_width="100%")  # of a telephone
+        wide, narrow = Layout(width="min(28em, 55vw)"), Layout(width="min(300px, 55vw)")  # of a telephone
         self._view = Dropdown(options=self._options(), value=self._first(), description=LOOK, layout=wide)
         camera = self._camera_of(self._view.value)
         self._camera = Dropdown(options=self.case.names, value=camera, description=CAMERA, layout=narrow)
         several = len(self.case.names) > 1
         choosers = [self._view, self._camera] if several else [self._view]
-        self._above = HBox(choosers, layout=Layout(flex_flow="row wrap", max_width="100%"))
+        self._above = HBox(choosers, layout=Layout(flex_flow="row wrap"))
         self._still_hidden = ""
         self._changed()
         self._view.observe(self._changed, "value")
@@ -131,7 +131,7 @@ class LiveInspection:
         before, self.explorer = self.explorer, explorer
         if self.widget is None:
             self.still_id = explorer.model_id
-            self.widget = VBox([self._above, explorer], layout=Layout(max_width="100%"))
+            self.widget = VBox([self._above, explorer])
             return
         self.widget.children = (self._above, explorer)
         if before is not None:
