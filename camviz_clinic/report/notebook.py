@@ -77,12 +77,13 @@ class LiveInspection:
             return
         folder = None if images is None else Path(images)
         self.case = Case(inspection.calibration, inspection.compare, images=folder, largest=_LARGEST)
-        self._view = Dropdown(
-            options=self._options(), value=self._first(), description=LOOK, layout=Layout(width="28em")
-        )
-        self._camera = Dropdown(options=self.case.names, value=self._camera_of(self._view.value), description=CAMERA)
+        wide, narrow = Layout(width="min(28em, 55vw)"), Layout(width="min(300px, 55vw)")  # of a telephone
+        self._view = Dropdown(options=self._options(), value=self._first(), description=LOOK, layout=wide)
+        camera = self._camera_of(self._view.value)
+        self._camera = Dropdown(options=self.case.names, value=camera, description=CAMERA, layout=narrow)
         several = len(self.case.names) > 1
-        self._above = HBox([self._view, self._camera] if several else [self._view])
+        choosers = [self._view, self._camera] if several else [self._view]
+        self._above = HBox(choosers, layout=Layout(flex_flow="row wrap"))
         self._still_hidden = ""
         self._changed()
         self._view.observe(self._changed, "value")

@@ -197,7 +197,7 @@ class EpipolarPairsView(ViewChooser):
             content += arrows(row[:1], row[-1:], "blue thick", 12) + svg.text(
                 row[0] + (-4, -10), "1", "blue halo middle"
             )
-        content += not_at_hand(panel) if image is None else ""
+        content += not_at_hand(panel) if image is None and shared.pictures else ""
         return panel.show(content, title=f"{shared.names[side]}: arrows × {self.scale:g}"), attached
 
     def _lines(self, panel: Panel, side: int) -> str:

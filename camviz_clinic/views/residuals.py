@@ -167,7 +167,7 @@ class ResidualsView(ViewChooser, OrbitView):
         """The chosen view's picture with its corners and arrows, and the photographs it needs."""
         seen, i, k = self.observations, self.index, self.observations.camera.intrinsics
         image = seen.photographs(i)
-        content, attached, missing = self._grid(panel), {}, not_at_hand(panel)
+        content, attached, missing = self._grid(panel), {}, not_at_hand(panel) if seen.pictures else ""
         if image is not None:
             content, missing = placed_image(panel, "photograph", k.width, k.height), ""
             attached = {"photograph": jpeg(image)}

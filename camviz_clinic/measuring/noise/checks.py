@@ -14,7 +14,7 @@ from math import hypot, isfinite, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc, chdtri
 
 from camviz_clinic.measuring.noise.estimate import CERTAIN, PROMISE, Estimate, combined, of
 from camviz_clinic.measuring.noise.hidden import QUANTISED
@@ -354,10 +354,10 @@ def _restless(each: list[tuple[Pair, float, float]]) -> float:
     if not kept:
         return 0.0
     squares = sum(drift**2 / noise for drift, noise, _ in kept)
-    if chi2.sf(squares, len(kept)) > BY_CHANCE:
+    if chdtrc(len(kept), squares) > BY_CHANCE:
         return 0.0
     beyond = sum(drift**2 - noise for drift, noise, _ in kept) / sum(2 * scale**2 for _, _, scale in kept)
-    return sqrt(max(beyond, 0.0) * len(kept) / float(chi2.ppf(0.01, len(kept))))
+    return sqrt(max(beyond, 0.0) * len(kept) / float(chdtri(len(kept), 0.99)))
 
 
 def _bend(line: list[Array], others: list[Array], y: Array, errors: Array, *, scattered: bool = False) -> Bend:

@@ -11,7 +11,7 @@ from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import f as fisher
+from scipy.special import fdtrc
 
 Array = NDArray[np.float64]
 
@@ -120,7 +120,7 @@ class Shading:
         if brought == 0 or freedom < 1:
             return 0.0
         ratio = brought / len(amplitudes) / max(chance, 1e-30)
-        return brought if fisher.sf(ratio, len(amplitudes), freedom) < BY_CHANCE else 0.0
+        return brought if fdtrc(len(amplitudes), freedom, ratio) < BY_CHANCE else 0.0
 
     def extremes(self) -> tuple[float, float]:
         """The lowest and the highest value (DN) of the smooth part about its mean; 0 where there is none."""

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from camviz.lenses.base import Array
 
@@ -225,7 +225,7 @@ class EdgeError:
         """The standard error of ln MTF, all parts together."""
         noise = self.independent * self.shared
         n = len(self.pieces[0])
-        if self.pieces[1] > noise * np.sqrt(float(chi2.isf(UNLIKELY, n - 1)) / (n - 1)):
+        if self.pieces[1] > noise * np.sqrt(float(chdtri(n - 1, UNLIKELY)) / (n - 1)):
             noise = self.pieces[1]
         others = self.bend / 2, self.alias / 2, self.light, SHARE_OF_PROCESSED * self.processed, self.rounding, FLOOR
         return float(np.sqrt(noise**2 + np.sum(np.square(others))))

@@ -222,8 +222,8 @@ class FaultLabView(ViewChooser):
             content += svg.dots(panel.place([(error, y)]), class_, 8)
             level = panel.y + panel.place((0, y))[1] + 4
             beside += svg.text((panel.x - 10, level), name, "label end")
-            words = f"{_signed(error, sigma)} px"
-            beside += svg.text((panel.x + panel.width + 10, level), words, f"number{' red' if far else ''}")
+            words, class_ = _signed(error, sigma), f"number{' red' if far else ''}"  # in pixels, as the note says
+            beside += svg.text((panel.x + panel.width + 10, level), words, class_)
         shown = panel.show(content, title="Estimate ± 1σ, less the truth")
         ticks = [(float(t), true_minus(f"{t:g}")) for t in plot.ticks(-reach, reach, 3)]
         below = "".join(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -109,7 +109,8 @@ class Patient:
         from camviz_clinic.report.notebook import LiveInspection
 
         words = f"<p><b>{escape(self.name)}.</b> “{escape(self.story)}”</p>"
-        live = LiveInspection(Inspection(self.calibration, (), ()))
+        shown = replace(self.calibration, pictures={})  # nobody took any: none can be named or missed
+        live = LiveInspection(Inspection(shown, (), ()))
         if not self.calibration.detections:
             live.show("numbers")
         live.display({"text/html": words, "text/plain": f"{self.name}. “{self.story}”"})
