@@ -86,7 +86,7 @@ class VanishingView(View):
     def horizon(self) -> tuple[float, float]:
         """Its row in the middle column, and its slope: through both points, or through the one that is not at infinity
         along the other's parallel lines; NaN where a wall is not seen."""
-        a, b, c = np.cross(*(self._direction(name) for name in "xz"))
+        a, b, c = np.cross(self._direction("x"), self._direction("z"))
         return (-(a * self._centre[0] + c) / b, -a / b) if b else (np.nan, np.nan)
 
     def _direction(self, name: str) -> Array:
