@@ -45,11 +45,8 @@ class NumbersView(View):
             ("focal lengths fx, fy", f"{k.fx:.6g}, {k.fy:.6g} px"),
             ("fx / fy", f"{k.fx / k.fy:.5f}"),
             ("principal point cx, cy", f"{k.cx:.6g}, {k.cy:.6g} px"),
-            (
-                "from the middle",
-                f"{away[0]:+.1f}, {away[1]:+.1f} px "
-                f"({100 * np.linalg.norm(away) / np.hypot(k.width, k.height):.1f} % of the diagonal)",
-            ),
+            ("from the middle", f"{away[0]:+.1f}, {away[1]:+.1f} px"),
+            ("that is of the diagonal", f"{100 * np.linalg.norm(away) / np.hypot(k.width, k.height):.1f} %"),
             ("field of view across, down", self._fields_of_view()),
         ]
         rows += [("skew", f"{k.skew:.6g}")] if k.skew else []

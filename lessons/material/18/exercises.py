@@ -393,7 +393,9 @@ def any_height(
 def _tilted(rng: np.random.Generator) -> Iterator[Arguments]:
     for number in range(5):
         K, R, _ = _camera(rng, tilt=25.0 if number else 0.0)
-        K[:2, 2] -= 3000 if number == 3 else 0  # cropped
+        while number > 2 and (-1) ** number * R[2, 1] > -0.2:  # tilted by 12° and more, once up and once down
+            K, R, _ = _camera(rng, tilt=25.0)
+        K[:2, 2] -= 900 if number == 3 else 0  # cropped
         eye, tall, door = rng.uniform(1, 2.5), rng.uniform(0.4, 4), rng.uniform(1.5, 3)
         ahead = R[2] * (1, 0, 1) / np.hypot(R[2, 0], R[2, 2])
         aside = np.cross([0, 1, 0], ahead)
@@ -404,8 +406,8 @@ def _tilted(rng: np.random.Generator) -> Iterator[Arguments]:
 
         one = ahead * rng.uniform(6, 25) + aside * rng.uniform(-2, 2)
         two = ahead * rng.uniform(5, 9) + aside * rng.uniform(-2, 2)
-        horizon = np.cross(K @ R[:, 0], K @ R[:, 2]) * rng.choice([-1, 1]) * rng.uniform(0.1, 3)
-        vertical = K @ R[:, 1] * rng.choice([-1, 1]) * rng.uniform(0.1, 3)
+        horizon = np.cross(K @ R[:, 0], K @ R[:, 2]) * (-1) ** number * rng.uniform(0.1, 3)
+        vertical = K @ R[:, 1] * (-1) ** (number // 2) * rng.uniform(0.1, 3)
         yield pixel(one, 0), pixel(one, tall), pixel(two, 0), pixel(two, door), door, horizon, vertical
 
 
@@ -525,7 +527,9 @@ def _triangles(rng: np.random.Generator) -> Iterator[Arguments]:
         roll = np.radians(rng.uniform(5, 25))
         turn = np.array([[np.cos(roll), -np.sin(roll), 0], [np.sin(roll), np.cos(roll), 0], [0, 0, 1]])
         x = K @ turn @ tilt @ R
-        yield tuple((x[:2] / x[2]).T)
+        a, b, c = (x[:2] / x[2]).T
+        yield a, b, c
+    yield a, c, b  # so that b - c has both signs
 
 
 PRINCIPAL_POINT = Exercise(
