@@ -28,7 +28,7 @@ JOINED = """async (ways) => {
   for (const one of document.querySelectorAll("pre")) one.tabIndex = 0;     // as the theme's script does on each page
 }"""
 EACH_KIND = (
-    *("index", "learn", "about", "search", "api/camviz.lenses", "docs/engineers/calibrate-a-camera", "docs/formats"),
+    *("index", "learn", "about", "search", "api/camviz.cameras", "docs/engineers/calibrate-a-camera", "docs/formats"),
     *("engineers/reports/index", "engineers/reports/moved-centre", LESSON),
 )
 """A page of each kind, which axe reads without --all."""
