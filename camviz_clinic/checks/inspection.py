@@ -9,8 +9,6 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Self
 
-import numpy as np
-
 from camviz.cameras import Camera
 from camviz_clinic.calibration.stamp import Stamp
 from camviz_clinic.calibration.types import Board, Calibration
@@ -22,7 +20,7 @@ from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.findings import kinds
 from camviz_clinic.checks.findings.described import described_wrong
 from camviz_clinic.checks.registry import Finding
-from camviz_clinic.checks.summary import Summary
+from camviz_clinic.checks.summary import Summary, bend_mm
 from camviz_clinic.files import CalibrationError, load
 from camviz_clinic.files.output import json_text
 
@@ -138,11 +136,9 @@ class Inspection:
 
     def _board_warp(self) -> dict[str, Any]:
         """The board's two sagittas and their σ in mm, where they were solved for."""
-        if self.calibration is None or self.calibration.board_warp is None:
+        if self.calibration is None or (found := bend_mm(self.calibration)) is None:
             return {}
-        covariance = self.calibration.board_warp_covariance
-        sigmas = None if covariance is None else (1000 * np.sqrt(np.diag(covariance))).tolist()
-        return {"board_warp": {"mm": (1000 * self.calibration.board_warp).tolist(), "sigma_mm": sigmas}}
+        return {"board_warp": dict(zip(("mm", "sigma_mm"), found, strict=True))}
 
     def _camera(self, name: str, camera: Camera) -> dict[str, Any]:
         grid = camera.intrinsics

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
@@ -24,6 +24,15 @@ MOST_CAMERAS = 4
 RMS, MIDDLE, CORNER = "RMS error", "uncertainty, centre", "uncertainty, worst corner"
 BEND = ("board's bend along rows", "board's bend along columns")
 LEGEND = "± is one standard deviation, by the scatter of the views; uncertainty: of the pixel of a far point."
+
+
+def bend_mm(calibration: Calibration) -> tuple[list[float], list[float] | None] | None:
+    """The board's two sagittas and their σ in mm; None where the bend was not solved for, and for an unknown σ."""
+    warp, covariance = calibration.board_warp, calibration.board_warp_covariance
+    if warp is None:
+        return None
+    sigmas = None if covariance is None else (1000 * np.sqrt(np.diag(covariance))).tolist()
+    return (1000 * warp).tolist(), sigmas
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,11 +152,11 @@ class Summary:
     @property
     def bend(self) -> dict[str, str]:
         """The board's two sagittas with their ± σ in mm, as text, where the bend was solved for."""
-        warp, covariance = self.calibration.board_warp, self.calibration.board_warp_covariance
-        if warp is None:
+        if (found := bend_mm(self.calibration)) is None:
             return {}
-        sigmas = [None, None] if covariance is None else (1000 * np.sqrt(np.diag(covariance))).tolist()
-        told = [measured(1000 * float(sagitta), sigma) for sagitta, sigma in zip(warp, sigmas, strict=True)]
+        sagittas, sigmas = found
+        deviations: Sequence[float | None] = sigmas or (None, None)
+        told = map(measured, sagittas, deviations)
         return dict(zip(BEND, (f"{each} mm" for each in told), strict=True))
 
     @property
