@@ -33,7 +33,8 @@ def test_a_dragged_end_moves_its_own_line_and_no_other(handle, moves):
         if name == moves:
             expected[int(handle[3:]) % 4] = 3, -2
         np.testing.assert_allclose(off, expected, atol=1e-9)
-    assert np.isfinite(moved.pressed(handle, "ArrowLeft").focal)
+    by_key = np.subtract(moved.pressed(handle, "ArrowLeft").moved, moved.moved)
+    np.testing.assert_allclose(by_key[int(handle[3:])], (-1, 0), atol=0.01)
 
 
 def test_a_dragged_end_changes_the_focal_length_and_where_the_lines_meet():

@@ -88,6 +88,8 @@ class View:
     layouts: ClassVar[Iterable[str]] = ()
     openable: ClassVar[Mapping[str, str]] = {}
     """Panels that a reader opens and closes: their names in `panels`, and the words on their buttons."""
+    arrow: ClassVar[float] = 10.0
+    """How far an arrow key drags a handle, in the picture's units."""
 
     def __post_init__(self) -> None:
         for name, control in self.controls().items():
@@ -170,10 +172,10 @@ class View:
         return self
 
     def pressed(self, handle: str, key: str) -> Self:
-        """The view after `key` (an arrow, "+" or "-") was pressed on `handle`; an arrow drags by ten units."""
-        steps = {"ArrowLeft": (-10, 0), "ArrowRight": (10, 0), "ArrowUp": (0, -10), "ArrowDown": (0, 10)}
+        """The view after `key` (an arrow, "+" or "-") was pressed on `handle`; an arrow drags by `arrow` units."""
+        steps = {"ArrowLeft": (-1, 0), "ArrowRight": (1, 0), "ArrowUp": (0, -1), "ArrowDown": (0, 1)}
         dx, dy = steps.get(key, (0, 0))
-        return self.dragged(handle, float("nan"), float("nan"), dx, dy)
+        return self.dragged(handle, float("nan"), float("nan"), dx * self.arrow, dy * self.arrow)
 
     def save(self, path: str | Path, **options: Any) -> None:
         """Write the picture of this state to a .svg, .png or .pdf file; see `Picture.save` for theme and resolution."""

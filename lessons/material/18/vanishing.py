@@ -41,6 +41,7 @@ class VanishingView(View):
 
     title: ClassVar[str] = "Vanishing points"
     openable: ClassVar[Mapping[str, str]] = {"above": "from above", "numbers": "numbers"}
+    arrow: ClassVar[float] = float(PAPER.scale[0])  # a pixel of the photograph
 
     turn_deg: float = slider(0.0, -25.0, 42.0, 1.0, label="turn", unit="°", help="of the camera, to the right")
     tilt_deg: float = slider(0.0, -10.0, 14.0, 0.5, label="tilt", unit="°", help="of the camera, upwards")
@@ -193,7 +194,7 @@ class VanishingView(View):
         if not np.isfinite(at).all():
             return ""
         hand = svg.element("circle", cx=float(at[0]), cy=float(at[1]), r=13, fill_opacity=0, class_="card")
-        words = f"End {index % 2 + 1} of {colour} line {index // 2 % 2 + 1}; arrow keys move it"
+        words = f"End {index % 2 + 1} of {colour} line {index // 2 % 2 + 1}; arrow keys move it by a pixel"
         dot = svg.dots([at], "paper-dot", 10) + svg.dots([at], colour, 7)
         return svg.group(hand + dot, data_drag=f"end{index}", tabindex=0, role="group", aria_label=words)
 
