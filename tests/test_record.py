@@ -3,6 +3,7 @@
 import json
 import re
 import sys
+from base64 import b64encode
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -16,7 +17,16 @@ from camviz.draw.picture import Picture, jpeg
 from camviz.views.base import View, choice, slider, switch
 from camviz.views.distortion import DistortionView
 from camviz.widgets import explore
-from camviz_school.record import Axis, Budget, BudgetError, RecordedPane, Widget, record
+from camviz_school.record import (
+    Axis,
+    Budget,
+    BudgetError,
+    RecordedPane,
+    Widget,
+    record,
+    write_module,
+    write_page,
+)
 from camviz_school.record.packing import Images, Pack
 from camviz_school.record.panes import Explored
 from camviz_school.views.readout import ReadoutView
@@ -253,3 +263,30 @@ def test_the_still_on_the_page_has_its_words_and_sizes_and_is_outside_it(tmp_pat
     assert "data:image/webp;base64," in (tmp_path / name).read_text()
     assert f'data-recording="files/{made.pack}" data-positions="{made.positions}"' in html
     assert len(html) < 1500
+
+
+@pytest.mark.parametrize(("write", "name"), [(write_module, "toy.mjs"), (write_page, "toy.html")])
+def test_a_pane_in_one_file_has_all_its_files_within(tmp_path, write, name):
+    made = record(explore(Toy(), "size"), tmp_path / "recorded", budget=Budget(slider=5))
+    text = write(made, tmp_path / name).read_text(encoding="utf-8")
+    photographs = [one for one in made.files if one.endswith(".webp")]
+    assert len(photographs) == 4  # of sizes 0 to 7.5; 10 is refused
+    for one in photographs:
+        data = b64encode((made.folder / one).read_bytes()).decode()
+        assert f'camvizRecorded("{one}","data:image/webp;base64,{data}")' in text
+    assert text.count("A still picture.") == 1
+
+
+def test_no_text_of_a_widget_ends_the_script_of_a_page(tmp_path):
+    class Talker(anywidget.AnyWidget):
+        _esm = "export default { render({ el }) { el.innerHTML = '<!-- <script></script>'; } };"
+        words = traitlets.Unicode("</script><b>out</b>").tag(sync=True)
+
+    made = record(Widget(Talker(), (), "Talker"), tmp_path)
+    assert write_page(made, tmp_path / "page.html").read_text(encoding="utf-8").count("</script") == 1
+
+
+def test_a_file_of_another_ending_is_refused(tmp_path):
+    made = record(explore(Toy(), "size"), tmp_path, budget=Budget(slider=5))
+    with pytest.raises(ValueError, match=r"the file must end in \.mjs, got toy\.js"):
+        write_module(made, tmp_path / "toy.js")

@@ -4,26 +4,20 @@ import os
 import shutil
 import subprocess
 import sys
-import threading
-from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from contextlib import ExitStack
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pooch
 import pytest
+from file_server import files_served
 
 from camviz_school import samples
 from camviz_school.samples import REGISTRY, SampleUnavailable, chessboard_pictures, sample
 
 FOLDER = os.environ.get("CAMVIZ_SAMPLES")
 NOWHERE = "http://127.0.0.1:9/"
-
-
-class Quiet(SimpleHTTPRequestHandler):
-    def log_message(self, *_):
-        pass
 
 
 @pytest.fixture
@@ -44,18 +38,13 @@ def _bare_machine(tmp_path, monkeypatch):
 @pytest.fixture
 def serve(monkeypatch):
     """Makes a folder the network's."""
-    servers = []
+    with ExitStack() as servers:
 
-    def start(folder):
-        server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(folder)))
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        servers.append(server)
-        monkeypatch.setattr(samples, "BASE_URL", f"http://127.0.0.1:{server.server_port}/")
+        def start(folder):
+            address = servers.enter_context(files_served(folder))
+            monkeypatch.setattr(samples, "BASE_URL", f"{address}/")
 
-    yield start
-    for server in servers:
-        server.shutdown()
-        server.server_close()
+        yield start
 
 
 def test_the_registry_holds_both_cameras_and_the_calibrations():

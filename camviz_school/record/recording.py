@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from html import escape
 from importlib.resources import files
@@ -122,7 +122,17 @@ class RecordedPane:
         Returns: HTML, one element.
         Raises: OSError where the folder cannot be written.
         """
-        stills = _room(self.controls) + _stills(self.still, self.folder, base) if self.still else ""
+        return self._html(base, lambda picture: _stills(picture, self.folder, base))
+
+    def html_within(self) -> str:
+        """The pane for a page that has all its files within: the first picture is in the HTML.
+
+        Returns: HTML, one element.
+        """
+        return self._html("", Picture.figure)
+
+    def _html(self, base: str, figure: Callable[[Picture], str]) -> str:
+        stills = _room(self.controls) + figure(_lighter(self.still)) if self.still else ""
         stills += '<div aria-hidden="true" style="height:34px"></div>' if self.still and self.panels else ""
         words = f"A still picture. With JavaScript it moves: {self.positions} positions are recorded."
         return (
@@ -303,9 +313,13 @@ def _room(controls: Sequence[str]) -> str:
     )
 
 
+def _lighter(picture: Picture) -> Picture:
+    """The picture with its photographs as WebP."""
+    return replace(picture, photographs={name: webp(data) for name, data in picture.photographs.items()})
+
+
 def _stills(picture: Picture, folder: Path, base: str) -> str:
     """The picture as a figure whose tiles are SVG files in the folder, loaded when they come near the screen."""
-    picture = replace(picture, photographs={name: webp(data) for name, data in picture.photographs.items()})
 
     def address(tile: Tile) -> str:
         drawn = picture.document(tile).encode()

@@ -1,17 +1,20 @@
 // Widgets that move without a kernel: their own JavaScript (an anywidget's `render`), unchanged, before a model that answers
 // from recorded frames. It finds every .camviz-recorded, and loads its recording when it comes near the screen.
 // A classic script, and recordings are scripts too: both may be loaded by a page that was opened as a file.
+// Where a recording is one file (record/one_file.py), it hands over its parts by name before they are asked for.
 (() => {
+  if (window.camvizRecorded) return;   // a second pane in one file brings the player again
   const NEAR = "600px";   // from the screen, where a recording is fetched
   const PANEL = "panel";   // the axis of panels that a button opens (record/panes.py)
   const LATE = "This picture stands still: its recording could not be loaded.";
-  const waiting = new Map(), sources = new Map();
+  const waiting = new Map(), kept = new Map(), sources = new Map(), styled = new WeakMap();
 
-  window.camvizRecorded = (name, content) => waiting.get(name)?.(content);
+  window.camvizRecorded = (name, content) => waiting.has(name) ? waiting.get(name)(content) : kept.set(name, content);
 
   // The content of a script that calls camvizRecorded.
   function loaded(address) {
     const name = address.split("/").pop();
+    if (kept.has(name)) return Promise.resolve(kept.get(name));
     return new Promise((done, failed) => {
       const script = document.createElement("script");
       waiting.set(name, done);
@@ -20,15 +23,25 @@
     }).finally(() => waiting.delete(name));
   }
 
+  // Where a photograph is.
+  const photograph = (base, name) => kept.get(name) ?? base + name;
+
+  // A widget's style sheet, once in the page, or in the shadow root that keeps the page's own sheets out.
+  function style(root, css) {
+    const sheets = styled.get(root) ?? new Set();
+    if (sheets.has(css)) return;
+    styled.set(root, sheets.add(css));
+    const sheet = document.createElement("style");
+    sheet.textContent = css;
+    (root.head ?? root).append(sheet);
+  }
+
   // A widget's module and style sheet, once for all its panes.
   function widget(address) {
     if (!sources.has(address)) sources.set(address, loaded(address).then(async ({ esm, css }) => {
-      const sheet = document.createElement("style");
-      sheet.textContent = css;
-      document.head.append(sheet);
       const url = URL.createObjectURL(new Blob([esm], { type: "text/javascript" }));
       const { default: own, render } = await import(url);
-      return (typeof own === "function" ? await own() : own) ?? { render };
+      return { css, ...((typeof own === "function" ? await own() : own) ?? { render }) };
     }));
     return sources.get(address);
   }
@@ -45,7 +58,7 @@
       if (value.$text) return text(value.$text);
       if (value.$joined) return value.$joined.map((one) => unpacked(one, told)).join("");
       if (value.$tile) return unpacked(tile(value, told), told);
-      if (value.$image) return base + value.$image;
+      if (value.$image) return photograph(base, value.$image);
       return Object.fromEntries(Object.entries(value).map(([name, one]) => [name, unpacked(one, told)]));
     };
     const text = (runs) => {
@@ -202,7 +215,8 @@
   async function play(element) {
     const { recording } = element.dataset, base = recording.slice(0, recording.lastIndexOf("/") + 1);
     const content = await loaded(recording);
-    const { initialize, render } = await widget(base + content.source);
+    const { css, initialize, render } = await widget(base + content.source);
+    style(element.getRootNode(), css);
     const pane = document.createElement("div"), line = element.querySelector(".camviz-recorded-line");
     const stills = [...element.children].filter((one) => one !== line);
     await Promise.all(images([content.frames[0]], base).map((one) => one.decode().catch(() => {})));
@@ -234,7 +248,7 @@
   // The photographs of some frames, fetched before they are asked for; they stay at hand as long as they are held.
   function images(frames, base) {
     const names = new Set(JSON.stringify(frames).match(/(?<="\$image":")[^"]+/g));
-    return [...names].map((name) => Object.assign(new Image(), { fetchPriority: "low", src: base + name }));
+    return [...names].map((name) => Object.assign(new Image(), { fetchPriority: "low", src: photograph(base, name) }));
   }
 
   const watcher = new IntersectionObserver((entries) => {
@@ -247,7 +261,8 @@
       });
     }
   }, { rootMargin: NEAR });
-  const start = () => document.querySelectorAll(".camviz-recorded").forEach((element) => watcher.observe(element));
+  window.camvizRecorded.watch = (element) => watcher.observe(element);
+  const start = () => document.querySelectorAll(".camviz-recorded").forEach(window.camvizRecorded.watch);
   if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", start);
   else start();
 })();

@@ -3,14 +3,12 @@
 import json
 import os
 import re
-import threading
-from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
 from axe_playwright_python.base import AXE_SCRIPT
 from classroom import ask, camviz_class
+from file_server import files_served
 from laboratory import AXE, ROOT, new_page
 from playwright.sync_api import expect
 
@@ -219,11 +217,6 @@ def reading(browser, tmp_path):
         assert [one for one in room.wrong if "[PST]" not in one] == []
 
 
-class Quiet(SimpleHTTPRequestHandler):
-    def log_message(self, *_):
-        """Nothing."""
-
-
 def asked(page):
     """The question on a lesson's page."""
     return page.locator(".camviz-asked", has_text="Keep k1 = −0.3 and look at rays")
@@ -334,20 +327,17 @@ def test_at_home_a_lessons_page_asks_twice_and_then_says_why(reading):
 
 def test_the_published_page_offers_no_room(browser):
     """The same files, from anybody else's server."""
-    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(SITE)))
-    threading.Thread(target=server.serve_forever, daemon=True).start()
     page = new_page(browser)
     seen = []
     page.on("request", lambda one: seen.append(one.url))
-    page.goto(f"http://127.0.0.1:{server.server_port}/lessons/05_distortion.html")
-    commits(page, RIGHT)
-    expect(asked(page).locator(".camviz-reply")).to_contain_text("✓ Correct.")
-    assert page.locator(".camviz-class").count() == 0
-    assert "Vote with your class" not in page.content()
+    with files_served(SITE) as address:
+        page.goto(f"{address}/lessons/05_distortion.html")
+        commits(page, RIGHT)
+        expect(asked(page).locator(".camviz-reply")).to_contain_text("✓ Correct.")
+        assert page.locator(".camviz-class").count() == 0
+        assert "Vote with your class" not in page.content()
+        page.close()
     assert not [url for url in seen if "/api/" in url or "static/lesson" in url.replace("_static", "")]
-    page.close()
-    server.shutdown()
-    server.server_close()
 
 
 @pytest.mark.parametrize("way", ["index.html", "learn.html", "search.html", "lessons/05_distortion.html"])
