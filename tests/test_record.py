@@ -17,16 +17,7 @@ from camviz.draw.picture import Picture, jpeg
 from camviz.views.base import View, choice, slider, switch
 from camviz.views.distortion import DistortionView
 from camviz.widgets import explore
-from camviz_school.record import (
-    Axis,
-    Budget,
-    BudgetError,
-    RecordedPane,
-    Widget,
-    record,
-    write_module,
-    write_page,
-)
+from camviz_school.record import Axis, Budget, BudgetError, RecordedPane, Widget, record, write_one_file
 from camviz_school.record.packing import Images, Pack
 from camviz_school.record.panes import Explored
 from camviz_school.views.readout import ReadoutView
@@ -265,10 +256,10 @@ def test_the_still_on_the_page_has_its_words_and_sizes_and_is_outside_it(tmp_pat
     assert len(html) < 1500
 
 
-@pytest.mark.parametrize(("write", "name"), [(write_module, "toy.mjs"), (write_page, "toy.html")])
-def test_a_pane_in_one_file_has_all_its_files_within(tmp_path, write, name):
+@pytest.mark.parametrize("name", ["toy.mjs", "toy.html"])
+def test_a_pane_in_one_file_has_all_its_files_within(tmp_path, name):
     made = record(explore(Toy(), "size"), tmp_path / "recorded", budget=Budget(slider=5))
-    text = write(made, tmp_path / name).read_text(encoding="utf-8")
+    text = write_one_file(made, tmp_path / name).read_text(encoding="utf-8")
     photographs = [one for one in made.files if one.endswith(".webp")]
     assert len(photographs) == 4  # of sizes 0 to 7.5; 10 is refused
     for one in photographs:
@@ -283,10 +274,10 @@ def test_no_text_of_a_widget_ends_the_script_of_a_page(tmp_path):
         words = traitlets.Unicode("</script><b>out</b>").tag(sync=True)
 
     made = record(Widget(Talker(), (), "Talker"), tmp_path)
-    assert write_page(made, tmp_path / "page.html").read_text(encoding="utf-8").count("</script") == 1
+    assert write_one_file(made, tmp_path / "page.html").read_text(encoding="utf-8").count("</script") == 1
 
 
 def test_a_file_of_another_ending_is_refused(tmp_path):
     made = record(explore(Toy(), "size"), tmp_path, budget=Budget(slider=5))
-    with pytest.raises(ValueError, match=r"the file must end in \.mjs, got toy\.js"):
-        write_module(made, tmp_path / "toy.js")
+    with pytest.raises(ValueError, match=r"the file must end in \.mjs \(a module\) or \.html \(a page\), got toy\.js"):
+        write_one_file(made, tmp_path / "toy.js")

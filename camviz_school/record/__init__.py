@@ -24,8 +24,8 @@ Its JavaScript may call `get`, `set`, `save_changes`, `send`, `on` and `off`. Wh
 the names of the axes: {"x": 50}, or {"values": {"x": 50}}. Its frames are all traits that are synchronised. A widget
 that needs more (handles that are dragged, texts for small screens) implements `Pane`, as `Explored` does.
 
-**A page that others build** (MyST, Quarto, a learning platform) takes a pane in one file: `write_module` makes a module
-for MyST's `{anywidget}`, and `write_page` a page for a frame. See docs/recorded-widgets.md.
+**A page that others build** (MyST, Quarto, a learning platform) takes a pane in one file: `write_one_file` makes
+a module for MyST's `{anywidget}`, or a page for a frame. See docs/recorded-widgets.md.
 
 **What is recorded.** Each axis alone, the others at their first value, and the combinations of those that belong
 together. A wish between two positions is answered by the nearest one. A wish for two axes that were not recorded
@@ -39,7 +39,7 @@ which must be started afresh ("spawn"): a fork would share the OpenGL of solid p
 """
 
 from camviz_school.record.axes import Axis
-from camviz_school.record.one_file import write_module, write_page
+from camviz_school.record.one_file import write_one_file
 from camviz_school.record.panes import Pane, Widget
 from camviz_school.record.recording import Budget, BudgetError, RecordedPane, record, write_player
 
@@ -51,7 +51,6 @@ __all__ = [
     "RecordedPane",
     "Widget",
     "record",
-    "write_module",
-    "write_page",
+    "write_one_file",
     "write_player",
 ]

@@ -14,12 +14,13 @@ from pathlib import Path
 from camviz_school.record.recording import PLAYER, RecordedPane
 
 
-def write_module(pane: RecordedPane, path: str | Path) -> Path:
-    """Write a pane as a module that exports `render`, as anywidget's do: for MyST's `{anywidget}` or your own page.
+def write_one_file(pane: RecordedPane, path: str | Path) -> Path:
+    """Write a pane as one file that needs no other.
 
     Args:
         pane: What was recorded.
-        path: Of the file, which ends in .mjs.
+        path: Its ending says what is written. ".mjs": a module that exports `render` as anywidget's do, for MyST's
+            `{anywidget}`. ".html": a page, for a frame (iframe), a learning platform, or a double click.
 
     Returns: The path.
     Raises: ValueError for another ending.
@@ -30,53 +31,34 @@ def write_module(pane: RecordedPane, path: str | Path) -> Path:
     ...     _esm = "export default { render() {} }"
     ...     x = traitlets.Int(0).tag(sync=True)
     >>> made = record(Widget(Dot(), (Axis.slider("x", 0, 100, 1, first=0),), title="A dot"), "recorded")
-    >>> write_module(made, "dot.mjs").name
+    >>> write_one_file(made, "recorded/dot.mjs").name
     'dot.mjs'
     """
-    render = (
-        f"export default {{ render({{ el }}) {{ el.innerHTML = {_literal(pane.html_within())}; "
-        "window.camvizRecorded.watch(el.firstElementChild); } };"
+    path = Path(path)
+    writers = {".mjs": _module, ".html": _page}
+    if path.suffix not in writers:
+        raise ValueError(f"the file must end in .mjs (a module) or .html (a page), got {path.name}")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(writers[path.suffix](pane), encoding="utf-8")
+    return path
+
+
+def _module(pane: RecordedPane) -> str:
+    html = json.dumps(pane.html_within(), ensure_ascii=False)
+    return (
+        f"{_scripts(pane)}\n"
+        f"export default {{ render({{ el }}) {{ el.innerHTML = {html}; "
+        "window.camvizRecorded.watch(el.firstElementChild); } };\n"
     )
-    return _written(path, ".mjs", f"// {pane.title}\n{_scripts(pane)}\n{render}\n")
 
 
-def write_page(pane: RecordedPane, path: str | Path) -> Path:
-    """Write a pane as a page of its own, for a frame (iframe), a learning platform, or a double click.
-
-    Args:
-        pane: What was recorded.
-        path: Of the file, which ends in .html.
-
-    Returns: The path.
-    Raises: ValueError for another ending.
-
-    >>> import anywidget, traitlets
-    >>> from camviz_school.record import Axis, Widget, record
-    >>> class Dot(anywidget.AnyWidget):
-    ...     _esm = "export default { render() {} }"
-    ...     x = traitlets.Int(0).tag(sync=True)
-    >>> made = record(Widget(Dot(), (Axis.slider("x", 0, 100, 1, first=0),), title="A dot"), "recorded")
-    >>> write_page(made, "dot.html").name
-    'dot.html'
-    """
-    title = escape(pane.title)
-    return _written(
-        path,
-        ".html",
-        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
+def _page(pane: RecordedPane) -> str:
+    return (
+        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{escape(pane.title)}</title>'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         "<style>:root { color-scheme: light dark } body { margin: 4px; font-family: system-ui, sans-serif }</style>"
-        f"</head><body><main>{pane.html_within()}</main><script>{_scripts(pane)}</script></body></html>\n",
+        f"</head><body><main>{pane.html_within()}</main><script>{_scripts(pane)}</script></body></html>\n"
     )
-
-
-def _written(path: str | Path, ending: str, text: str) -> Path:
-    path = Path(path)
-    if path.suffix != ending:
-        raise ValueError(f"the file must end in {ending}, got {path.name}")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8")
-    return path
 
 
 def _scripts(pane: RecordedPane) -> str:
@@ -87,7 +69,3 @@ def _scripts(pane: RecordedPane) -> str:
         photograph = f"data:image/webp;base64,{b64encode(data).decode()}"
         parts.append(data.decode() if name.endswith(".js") else f'camvizRecorded("{name}","{photograph}");\n')
     return "".join(parts).replace("</", "<\\/").replace("<!--", "<\\!--")
-
-
-def _literal(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)

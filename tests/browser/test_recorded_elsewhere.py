@@ -51,7 +51,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Made]:
         patch.chdir(folder)
         for block in re.findall(r"```python\n(.*?)```", WRITTEN, flags=re.DOTALL):
             exec(block, names)
-        names["write_module"](names["lens"], "public/lens-70e86e1e.mjs")
+        names["write_one_file"](names["lens"], "public/lens-70e86e1e.mjs")
     public = folder / "public"
     (public / "wave-70e86e1e.mjs").write_bytes((public / "wave.mjs").read_bytes())  # MyST renames what it copies
     (public / "myst.html").write_text(MYST)
