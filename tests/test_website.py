@@ -3,7 +3,9 @@
 import inspect
 import json
 import re
+import subprocess
 import sys
+import time
 from dataclasses import replace
 from html import unescape
 from itertools import islice, pairwise
@@ -12,6 +14,7 @@ from types import SimpleNamespace
 
 import nbformat
 import numpy as np
+import psutil
 import pytest
 from docutils import nodes
 from docutils.core import publish_doctree
@@ -372,3 +375,31 @@ def test_a_pane_with_mistakes_shows_the_solution_first_and_says_so():
     assert html.index(">the solution<") < html.index(">upside down<") < html.index("<i>right</i>")
     assert html.index("<i>right</i>") < html.index("<em>head</em>") < html.index("<i>wrong</i>")
     assert "<button" not in mistakes.drawn_with("<i>right</i>", [])
+
+
+def test_a_build_that_is_killed_leaves_no_recorder_behind(tmp_path):
+    """SIGKILL, which no process hears."""
+    builder = tmp_path / "builder.py"
+    builder.write_text(
+        f"""import multiprocessing, os, sys, time
+from concurrent.futures import ProcessPoolExecutor
+sys.path[:0] = [{str(ROOT / "tools/website")!r}, {str(ROOT)!r}]
+from panes import end_with_parent
+
+def work(folder):
+    open(f"{{folder}}/started", "w").write(str(os.getpid()))
+    time.sleep(600)
+
+if __name__ == "__main__":
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(1, mp_context=spawn, initializer=end_with_parent) as pool:
+        pool.submit(work, sys.argv[1]).result()
+"""
+    )
+    with subprocess.Popen([sys.executable, builder, tmp_path]) as parent:
+        while not ((started := tmp_path / "started").exists() and started.read_text()):
+            assert parent.poll() is None
+            time.sleep(0.05)
+        parent.kill()
+    child = psutil.Process(int(started.read_text())) if psutil.pid_exists(int(started.read_text())) else None
+    assert child is None or child.wait(60) is None

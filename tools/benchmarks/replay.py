@@ -2,9 +2,9 @@
 
     python tools/benchmarks/replay.py [--changes 40] [--positions 400] [--no-all] [--no-speed]
 
-Replays three views in Chromium, timed as browser.py times the notebook, and records one state of every view
-(tests/every_view.py) with all its controls, two at a time. Prints Markdown for docs/performance.md. Leave the machine
-alone while it runs (about five minutes).
+Replays three views in Chromium, on a page and in one file each, timed as browser.py times the notebook, and records
+one state of every view (tests/every_view.py) with all its controls, two at a time. Prints Markdown for
+docs/performance.md. Leave the machine alone while it runs (some ten minutes).
 """
 
 import argparse
@@ -24,13 +24,37 @@ sys.path[:0] = [str(HERE.parents[1] / "tests"), str(HERE.parents[1] / "tests" / 
 
 from browser import COLUMNS, SLIDERS, measured, table  # noqa: E402
 from every_view import STATES  # noqa: E402
+from file_server import files_served  # noqa: E402
 from laboratory import chromium  # noqa: E402
+from playwright.sync_api import Browser  # noqa: E402
 from smallest import Smallest  # noqa: E402
 
 from camviz.widgets import explore  # noqa: E402
-from camviz_school.record import Axis, Budget, BudgetError, RecordedPane, Widget, record, write_player  # noqa: E402
+from camviz_school.record import (  # noqa: E402
+    Axis,
+    Budget,
+    BudgetError,
+    RecordedPane,
+    Widget,
+    record,
+    write_one_file,
+    write_player,
+)
+from camviz_school.record.packing import transferred  # noqa: E402
 
 LOOKED = 3  # times that each pane is timed; the table has the median
+HEAD = '<!doctype html><meta charset="utf-8"><link rel="icon" href="data:,">'
+MODULES = (
+    HEAD.replace("%", "%%")
+    + """<script type="module">
+  for (let i = 0; i < %d; i++) {
+    const { default: widget } = await import(`./${i}.mjs`);
+    const host = document.body.appendChild(document.createElement("div"));
+    const el = host.attachShadow({ mode: "open" }).appendChild(document.createElement("div"));
+    widget.render({ el });
+  }
+</script>"""
+)
 
 
 class Opened:
@@ -81,32 +105,61 @@ def report_of_all(folder: Path, budget: Budget) -> str:
     return f"{table(rows, head)}\n\n{on_disk:.0f} MB in the folder; {clock:.0f} s by the clock in two processes."
 
 
-def report_of_speed(folder: Path, changes: int) -> str:
-    """The table of slider to changed pixels."""
-    panes: list[tuple[str, list, RecordedPane]] = []
+def recordings(folder: Path) -> dict[str, tuple[list, RecordedPane]]:
+    """The smallest widget and three views: the slider that is moved, and the recorded pane."""
     dot = Widget(Smallest(), (Axis.slider("x", 0.0, 100.0, 0.1, 0.0),), "A dot")
-    panes.append(("the smallest widget", ["x", 0.0, 100.0], record(dot, folder)))
+    panes = {"the smallest widget": (["x", 0.0, 100.0], record(dot, folder))}
     for view, (name, low, high, step) in SLIDERS.items():
         module = import_module(f"camviz.views.{view.removesuffix('View').lower()}")
         explorer = explore(getattr(module, view)(), **{name: (low, high, step)})
-        panes.append((view, [name, low, high], record(explorer, folder)))
+        panes[view] = [name, low, high], record(explorer, folder)
+    return panes
+
+
+def replayed(browser: Browser, address: str, sliders: list[list], changes: int) -> list[list[float]]:
+    """Slider to changed pixels of the panes of a page, in its order."""
+    page = browser.new_page(viewport={"width": 1400, "height": 1000})
+    page.add_init_script(path=HERE.parents[1] / "tests/browser/hands.js")
+    page.goto(address)
+    page.add_script_tag(path=HERE / "stopwatch.js")
+    panes, rows = page.locator(".camviz-recorded"), []
+    panes.nth(len(sliders) - 1).wait_for(state="attached")
+    for slider, element in zip(sliders, panes.element_handles(), strict=True):
+        element.scroll_into_view_if_needed()
+        root = element.wait_for_selector(".camviz-explorer, .camviz-smallest")
+        page.wait_for_timeout(1500)  # until its photographs are there
+        runs = [measured(Opened(page), [root, slider], "explorer", changes) for _ in range(LOOKED)]
+        rows.append([*np.median(runs, axis=0)])
+    page.close()
+    return rows
+
+
+def report_of_speed(folder: Path, changes: int) -> str:
+    """The table of slider to changed pixels: panes on a page, each as a page of its own, and each as a module."""
+    panes = recordings(folder)
+    sliders = [slider for slider, _ in panes.values()]
     write_player(folder)
-    page = folder / "page.html"
-    html = "".join(pane.html() for *_, pane in panes)
-    page.write_text(f'<!doctype html><meta charset="utf-8">{html}<script src="replay.js" defer></script>')
-    rows = []
-    with chromium() as browser:
-        opened = browser.new_page(viewport={"width": 1400, "height": 1000})
-        opened.add_init_script(path=HERE.parents[1] / "tests/browser/hands.js")
-        opened.goto(page.as_uri())
-        opened.add_script_tag(path=HERE / "stopwatch.js")
-        for (name, slider, _), element in zip(panes, opened.query_selector_all(".camviz-recorded"), strict=True):
-            element.scroll_into_view_if_needed()
-            root = element.wait_for_selector(".camviz-explorer, .camviz-smallest")
-            opened.wait_for_timeout(1500)  # until its photographs are there
-            runs = [measured(Opened(opened), [root, slider], "explorer", changes) for _ in range(LOOKED)]
-            rows.append([name, *(f"{value:.0f}" for value in np.median(runs, axis=0))])
-    return table(rows, ["recorded", *COLUMNS])
+    html = "".join(pane.html() for _, pane in panes.values())
+    (folder / "page.html").write_text(f'{HEAD}{html}<script src="replay.js" defer></script>')
+    sizes = {"on a page": [pane.size for _, pane in panes.values()]}
+    for place, ending in (("a page of its own", "html"), ("a module", "mjs")):
+        files = [write_one_file(pane, folder / f"{i}.{ending}") for i, (_, pane) in enumerate(panes.values())]
+        sizes[place] = [transferred(path.read_bytes()) for path in files]
+    (folder / "modules.html").write_text(MODULES % len(panes))
+    with chromium() as browser, files_served(folder) as address:
+        times = {
+            "on a page": replayed(browser, f"{address}/page.html", sliders, changes),
+            "a page of its own": [
+                replayed(browser, f"{address}/{i}.html", [slider], changes)[0] for i, slider in enumerate(sliders)
+            ],
+            "a module": replayed(browser, f"{address}/modules.html", sliders, changes),
+        }
+    rows = [
+        [name, place, f"{sizes[place][i] / 1e3:.0f}", *(f"{value:.0f}" for value in times[place][i])]
+        for i, name in enumerate(panes)
+        for place in times
+    ]
+    return table(rows, ["recorded", "where", "kB as transferred", *COLUMNS])
 
 
 def main() -> None:

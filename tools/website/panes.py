@@ -16,6 +16,7 @@ import multiprocessing
 import os
 import re
 import sys
+import threading
 import time
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -58,6 +59,13 @@ class CodeCell(NamedTuple):
     exercise: str = ""
 
 
+def end_with_parent() -> None:
+    """End this process as soon as the one that started it is gone, however that was ended."""
+    parent = multiprocessing.parent_process()
+    if parent:
+        threading.Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()
+
+
 class RecordingError(Exception):
     """Lessons could not be recorded."""
 
@@ -79,7 +87,8 @@ class Recorder:
             return
         spawn = multiprocessing.get_context("spawn")  # a fresh interpreter each: a lesson leaves nothing to the next
         workers = min(len(stale), os.cpu_count() or 1)
-        with ProcessPoolExecutor(workers, mp_context=spawn, max_tasks_per_child=1) as pool:
+        end = end_with_parent
+        with ProcessPoolExecutor(workers, mp_context=spawn, max_tasks_per_child=1, initializer=end) as pool:
             jobs = {pool.submit(record_cells, self, name, cells): name for name, cells in stale.items()}
             for job in as_completed(jobs):
                 said = job.exception() or job.result()
