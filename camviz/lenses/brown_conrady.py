@@ -253,7 +253,7 @@ class BrownConrady(Lens):
 
         It never turns back, or has a pole before it does, at which it is infinite and all images end.
         """
-        N, D = self.numerator.coef, self.denominator.coef
+        N, D = (np.asarray(each.coef, dtype=float) for each in (self.numerator, self.denominator))
         sloping_N, sloping_D = (np.arange(len(each)) * each for each in (N, D))  # s N' and s D'
         # g' = (N D + 2 (s N' D - N s D')) / D²
         rising = np.convolve(N, D) + 2 * (np.convolve(sloping_N, D) - np.convolve(N, sloping_D))
