@@ -29,23 +29,32 @@ def found():
     return {side: detect(photographs(side), BOARD) for side in ("left", "right")}
 
 
-@pytest.fixture
-def half(found, room):
+@pytest.fixture(scope="module")
+def solved_by_half(found):
     """The left camera, calibrated from every other photograph."""
     left = found["left"]
-    write(
-        calibrate(replace(left, corners=left.corners[::2], pictures=left.pictures[::2], places=()), BOARD),
-        room / "half.yaml",
-        "opencv",
-    )
+    return calibrate(replace(left, corners=left.corners[::2], pictures=left.pictures[::2], places=()), BOARD)
+
+
+@pytest.fixture
+def half(solved_by_half, room):
+    """Its file."""
+    write(solved_by_half, room / "half.yaml", "opencv")
     return "half.yaml"
 
 
+@pytest.fixture(scope="module")
+def solved():
+    """A virtual camera, calibrated from 20 views."""
+    before = replace(single(np.random.default_rng(9), views=20), noise=0.08)
+    return before.solved(before.observed(np.random.default_rng(1)))
+
+
 @pytest.fixture
-def virtual(room, monkeypatch):
+def virtual(solved, room, monkeypatch):
     """camera.yaml of a virtual camera; its next pictures show what `see` is given."""
-    before, after = (replace(single(np.random.default_rng(9), views=views), noise=0.08) for views in (20, 25))
-    write(before.solved(before.observed(np.random.default_rng(1))), room / "camera.yaml", "opencv")
+    after = replace(single(np.random.default_rng(9), views=25), noise=0.08)
+    write(solved, room / "camera.yaml", "opencv")
     cv2.imwrite("new.png", np.zeros((8, 8), np.uint8))
 
     def see(camera):

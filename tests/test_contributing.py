@@ -145,7 +145,9 @@ def held(made, tests, words):
     return int(re.findall(r"(\d+) passed", said)[0])
 
 
+@pytest.mark.thorough
 def test_a_lens_is_one_file(tmp_path):
+    """In a copy of the whole repository; test_new_lens.py holds the same example to the same laws in one of camviz."""
     made = added(tmp_path, "camviz/lenses/")
     code = """
 from math import pi, sin
@@ -175,7 +177,7 @@ def test_a_calibration_format_is_one_file(tmp_path):
     assert held(made, "tests/test_formats_contract.py", "toy") > 2
 
 
-def test_a_finding_is_one_file(tmp_path):
+def test_a_finding_is_one_file(tmp_path, thorough):
     made = added(tmp_path, "camviz_clinic/checks/findings/")
     code = """
 import json
@@ -196,4 +198,5 @@ print(json.dumps([each.sentence for each in found if each.id == "skewed-pixels"]
     assert "skewed-pixels" in [each["id"] for each in json.loads(said)["findings"]]
     made.run("tools/docs/clinic.py", "--page")
     assert "### `skewed-pixels`" in made.text("docs/clinic.md")
-    assert held(made, "tests/test_faults.py", "promised and skew or healthy or every_finding") >= 8
+    words = "promised and skew or every_finding or " + ("healthy" if thorough else "20100")  # one camera and one pair
+    assert held(made, "tests/test_faults.py", words) >= (8 if thorough else 5)

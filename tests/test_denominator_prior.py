@@ -17,7 +17,8 @@ from camviz_clinic.calibration.cross_validation import held_out
 from camviz_clinic.calibration.denominator_prior import DenominatorPrior
 from camviz_clinic.calibration.difference import difference
 from camviz_clinic.calibration.regularisation import regularised, with_priors
-from camviz_clinic.checks.inspection import inspect
+from camviz_clinic.checks import kinds
+from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.virtual import SetUp, detections, spread_boards
 from camviz_clinic.files.writing import write
 from camviz_school.samples import SampleUnavailable, sample
@@ -59,7 +60,7 @@ def photographed(request):
 def test_on_the_samples_the_denominator_stays_above_a_fifth_over_the_whole_image(photographed):
     camera = photographed["rational"].cameras["camera"]
     assert least_denominator(camera) > NEARLY_A_POLE == 0.2
-    assert not [one for one in inspect(photographed["rational"]).findings if one.id == "near-pole"]
+    assert list(kinds()["near-pole"].check(Evidence(photographed["rational"]))) == []
 
 
 def test_on_the_samples_what_was_held_out_is_predicted_no_worse_than_by_the_standard_model(photographed):

@@ -214,10 +214,10 @@ def test_the_photograph_is_the_one_that_traces_every_ray():
 @pytest.mark.parametrize(
     "state",
     [
-        {},
-        {"f_number": 16.0},
+        pytest.param({}, marks=pytest.mark.thorough),
+        pytest.param({"f_number": 16.0}, marks=pytest.mark.thorough),
         {"focal_mm": 100.0, "f_number": 1.4, "focus_m": 1.2},
-        {"focus_m": 0.8},
+        pytest.param({"focus_m": 0.8}, marks=pytest.mark.thorough),
         {"aperture": "heart", "covered": "upper half"},
     ],
     ids=repr,

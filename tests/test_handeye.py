@@ -48,9 +48,20 @@ def test_the_closed_form_is_opencvs(eye_to_hand):
     assert X[:3, 3] == pytest.approx(place, abs=2e-7)
 
 
+PERFECT = {
+    "to a nanometre": {"robot_mm": 1e-6, "robot_deg": 1e-7, "noise_px": 1e-6},
+    "wholly": {
+        "robot_mm": 0,
+        "robot_deg": 1e-12,
+        "noise_px": 1e-9,
+    },  # its errors are looked for to the last step
+}
+
+
 @BOTH
-def test_a_perfect_robot_and_camera_give_x_and_z_exactly(eye_to_hand):
-    true = cell(np.random.default_rng(4), 8, eye_to_hand, robot_mm=0, robot_deg=1e-12, noise_px=1e-9)
+@pytest.mark.parametrize("how", ["to a nanometre", pytest.param("wholly", marks=pytest.mark.thorough)])
+def test_a_perfect_robot_and_camera_give_x_and_z_exactly(eye_to_hand, how):
+    true = cell(np.random.default_rng(4), 8, eye_to_hand, **PERFECT[how])
     found = solved(true)
     for ours, theirs in ((found.mount_from_cam, true.X), (found.other_from_board, true.Z)):
         assert ours.as_matrix() == pytest.approx(theirs.as_matrix(), abs=1e-7)

@@ -45,9 +45,9 @@ def test_nothing_is_found_where_nothing_is_wrong(thorough):
 
 def test_a_unit_is_named_with_what_asks_for_it():
     true = cell(np.random.default_rng(1), 10)
-    millimetres = of(case(scaled(true, 1000)), "wrong-unit")
-    assert millimetres.remedy == "Read the lengths as millimetres: --unit mm."
-    assert not case(scaled(true, 1000)).usable
+    millimetres = case(scaled(true, 1000))
+    assert of(millimetres, "wrong-unit").remedy == "Read the lengths as millimetres: --unit mm."
+    assert not millimetres.usable
     assert of(case(scaled(true, 0.001)), "wrong-unit").remedy == "Read the lengths as metres: --unit m."
     inches = of(case(scaled(true, 1000 / 25.4)), "wrong-unit")
     assert "by 25.4" in inches.remedy
@@ -124,9 +124,9 @@ def test_ten_degrees_about_a_second_axis_are_enough(second, found):
 
 def test_a_robot_that_did_not_turn_leaves_the_whole_place_unknown():
     true = cell(np.random.default_rng(9), turns=Rotation.from_rotvec(np.zeros((10, 3)) + [0.1, 0.2, 0]))
-    finding = of(case(true), "little-turning")
-    assert finding.severity == "fault"
-    assert not case(true).usable
+    found = case(true)
+    assert of(found, "little-turning").severity == "fault"
+    assert not found.usable
 
 
 def test_a_stray_pose_is_named_with_its_picture_and_how_far_it_is_off():
@@ -169,9 +169,9 @@ def test_a_robot_that_disagrees_in_no_way_that_can_be_mended_is_told_from_one_pe
 def test_with_five_poses_other_readings_are_not_tried_and_it_is_said():
     true = cell(np.random.default_rng(14), FEWEST_TRIED)
     assert of(case(scaled(true, 1000)), "wrong-unit")
-    few = replace(true, base_from_hand=true.base_from_hand[:5], pixels=true.pixels[:5])
-    assert dict(case(few).skipped)["wrong-unit"] == "it takes 6 poses or more"
-    assert "wrong-unit" not in case(few).checked
+    few = case(replace(true, base_from_hand=true.base_from_hand[:5], pixels=true.pixels[:5]))
+    assert dict(few.skipped)["wrong-unit"] == "it takes 6 poses or more"
+    assert "wrong-unit" not in few.checked
 
 
 def test_without_times_no_offset_is_looked_for_and_it_is_said():

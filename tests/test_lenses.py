@@ -29,7 +29,7 @@ from camviz.lenses import (
     UnifiedSphere,
     same_lenses,
 )
-from camviz.lenses.base import on_plane, unit
+from camviz.lenses.base import Lens, on_plane, unit
 
 FOCAL_PX = 500
 TOLERANCE = 1e-9 / FOCAL_PX  # 1e-9 px
@@ -580,6 +580,20 @@ def test_jacobians_agree_with_finite_differences(name):
     step = 1e-6 * np.eye(2)
     numeric = (lens.distort(xy[:, None] + step) - lens.distort(xy[:, None] - step)) / 2e-6
     np.testing.assert_allclose(lens.jacobian(xy), np.swapaxes(numeric, -1, -2), rtol=1e-6, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", [name for name in EXAMPLES if name.startswith("brown_conrady")])
+def test_closed_derivatives_are_those_of_differences(name):
+    """By the ray and by every coefficient: those of `Lens`, which knows only what `project_unchecked` answers."""
+    lens, widest_deg = EXAMPLES[name]
+    reach = 0.7 * np.tan(np.radians(min(widest_deg, 40)))
+    rays = unit(on_plane(np.random.default_rng(5).uniform(-reach, reach, size=(2, 25, 2))))
+    np.testing.assert_allclose(lens.ray_jacobian(rays), Lens.ray_jacobian(lens, rays), rtol=1e-8, atol=1e-8)
+    for parameter in lens.parameters():
+        ours, theirs = (
+            each(lens, parameter, rays) for each in (type(lens).parameter_jacobian, Lens.parameter_jacobian)
+        )
+        np.testing.assert_allclose(ours, theirs, rtol=1e-8, atol=1e-8, err_msg=parameter)
 
 
 def test_the_jacobian_keeps_leading_axes():

@@ -3,6 +3,7 @@
 import asyncio
 import re
 from dataclasses import replace
+from functools import cache
 from html.parser import HTMLParser
 
 import cv2
@@ -49,12 +50,25 @@ def parsed(text: str) -> Strict:
     return page
 
 
-@pytest.fixture(scope="module", params=["healthy", "sick", "pair", "bare"])
+CALIBRATIONS = {"healthy": single, "sick": sick, "pair": pair, "bare": bare}
+
+
+@cache
+def inspected(name: str) -> Inspection:
+    """The inspection of one of `CALIBRATIONS`, made once."""
+    return inspect(CALIBRATIONS[name]())
+
+
+@cache
+def reported(name: str) -> str:
+    """Its report, made once."""
+    return report(inspected(name))
+
+
+@pytest.fixture(scope="module", params=CALIBRATIONS)
 def page(request):
-    calibration = {"healthy": single, "sick": sick, "pair": pair, "bare": bare}[request.param]()
-    inspection = inspect(calibration)
-    text = report(inspection)
-    return inspection, text, parsed(text)
+    text = reported(request.param)
+    return inspected(request.param), text, parsed(text)
 
 
 def test_every_link_inside_the_page_leads_somewhere(page):
@@ -88,7 +102,7 @@ def test_findings_come_first_with_their_words(page):
 
 
 def test_the_bars_pictures_and_boards_of_a_view_share_its_number():
-    text = report(inspect(sick()))
+    text = reported("sick")
     bars = set(re.findall(r'<a href="#of-camera-\d+" data-choose="(\d+)" aria-label', text))
     boards = set(re.findall(r'data-choose="(\d+)" class="board"', text))
     figures = set(re.findall(r'<figure id="of-camera-\d+" data-view="(\d+)"', text))
@@ -101,11 +115,10 @@ def test_photographs_are_embedded_small(tmp_path):
     calibration = single()
     for name in calibration.pictures["camera"]:
         cv2.imwrite(str(tmp_path / name), cv2.GaussianBlur(noise, (0, 0), 3))
-    text = report(inspect(calibration), images=tmp_path)
+    text = report(inspected("healthy"), images=tmp_path)
     assert len(text) < 5e6
     assert "is not at hand" not in text
-    without = report(inspect(calibration))
-    assert "The picture is not at hand; name its folder: --images FOLDER" in without
+    assert "The picture is not at hand; name its folder: --images FOLDER" in reported("healthy")
     assert text.count("data:image/jpeg") >= 10
 
 
@@ -181,16 +194,15 @@ def test_names_from_a_file_are_words_and_not_html():
 
 
 def test_the_report_is_written_as_it_is_made(tmp_path):
-    inspection = inspect(bare())
-    write_report(inspection, tmp_path / "report.html")
-    assert (tmp_path / "report.html").read_text(encoding="utf-8") == report(inspection)
+    write_report(inspected("bare"), tmp_path / "report.html")
+    assert (tmp_path / "report.html").read_text(encoding="utf-8") == reported("bare")
 
 
 # In a notebook -------------------------------------------------------------------------------------------------------
 
 
 def test_the_notebook_shows_the_view_of_the_worst_finding_first_and_any_other_on_demand():
-    inspection = inspect(sick())
+    inspection = inspected("sick")
     live = LiveInspection(inspection)
     first = inspection.findings[0].view
     assert type(live.view) is type(VIEWS[ALIASES.get(first, first)].view(live.case))
@@ -201,7 +213,7 @@ def test_the_notebook_shows_the_view_of_the_worst_finding_first_and_any_other_on
 
 
 def test_the_notebook_chooses_between_cameras():
-    live = LiveInspection(inspect(pair())).show("residual-histogram", "right")
+    live = LiveInspection(inspected("pair")).show("residual-histogram", "right")
     assert live.view.observations.name == "right"
     with pytest.raises(ValueError, match="camera must be one of left, right, got 'top'"):
         live.show("coverage", "top")
@@ -235,7 +247,7 @@ def test_the_saved_still_is_of_the_view_that_was_chosen_last(displayed, monkeypa
     monkeypatch.setattr("camviz.widgets.still.update_display", lambda bundle, **_: kept.append(bundle["text/plain"]))
 
     async def cell() -> None:
-        live = LiveInspection(inspect(sick()))
+        live = LiveInspection(inspected("sick"))
         live._ipython_display_()
         live.show("coverage")
         await asyncio.sleep(0.01)
@@ -246,11 +258,11 @@ def test_the_saved_still_is_of_the_view_that_was_chosen_last(displayed, monkeypa
 
 
 def test_whatever_view_is_chosen_later_hides_the_one_still(displayed):
-    live = LiveInspection(inspect(sick()))
+    live = LiveInspection(inspected("sick"))
     live._ipython_display_()
     assert live.still_id in live.show("coverage").explorer.still_hidden
 
 
 def test_a_file_that_cannot_be_read_has_words_alone(displayed):
-    LiveInspection(replace(inspect(bare()), calibration=None))._ipython_display_()
+    LiveInspection(replace(inspected("bare"), calibration=None))._ipython_display_()
     assert len(displayed) == 1

@@ -1,5 +1,7 @@
 """Pictures that show another board than the one asked for: one sentence that says which, and what to try."""
 
+from functools import cache
+
 import cv2
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from camviz_clinic.calibration import Board, CannotCalibrate, detect, find_corne
 from camviz_clinic.calibration.wrong_board import part_of_a_larger
 from camviz_clinic.checks.photographs import photographed
 
+QUICK = {"finder": "classic", "workers": 1}  # the thorough finder takes a second to find nothing
 CAMERA = Camera(Intrinsics.from_fov(480, 360, 60))
 POSES = [
     RigidTransform.from_components([-0.09, -0.05, 0.38], Rotation.from_rotvec(turn))
@@ -32,7 +35,13 @@ SHOWN = {
 }
 
 
-def taken(board, folder):
+@pytest.fixture(scope="module")
+def taken(tmp_path_factory):
+    """Two photographs of each board of `SHOWN`, made once."""
+    return cache(lambda kind: photographs(SHOWN[kind][0], tmp_path_factory.mktemp(kind)))
+
+
+def photographs(board, folder):
     paths = []
     for view, pose in enumerate(POSES):
         paths.append(folder / f"view{view}.png")
@@ -41,16 +50,16 @@ def taken(board, folder):
 
 
 @pytest.mark.parametrize("kind", SHOWN)
-def test_a_board_that_was_not_asked_for_is_named_with_the_options_that_ask_for_it(kind, tmp_path):
-    shown, said = SHOWN[kind]
+def test_a_board_that_was_not_asked_for_is_named_with_the_options_that_ask_for_it(kind, taken):
+    _, said = SHOWN[kind]
     with pytest.raises(CannotCalibrate, match=f"view0.png and view1.png show what looks like {said}"):
-        detect(taken(shown, tmp_path), Board(11, 7, 0.02), workers=1)
+        detect(taken(kind), Board(11, 7, 0.02), **QUICK)
 
 
-def test_a_part_of_a_larger_board_is_not_taken_for_the_board(tmp_path):
+def test_a_part_of_a_larger_board_is_not_taken_for_the_board(taken):
     """Of 8×5 corners 6×4 could be found; beyond them the squares go on, beyond all of them they do not."""
     whole, part = SHOWN["chessboard"][0], Board(6, 4, 0.028)
-    paths = taken(whole, tmp_path)
+    paths = taken("chessboard")
     corners = [find_corners(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE), whole) for path in paths]
     some = [each.reshape(5, 8, 2)[:4, 1:7].reshape(-1, 2) for each in corners]
     names = [path.name for path in paths]
@@ -65,4 +74,4 @@ def test_pictures_of_nothing_are_not_taken_for_a_board(tmp_path):
     for path in paths:
         cv2.imwrite(str(path), np.random.default_rng(1).integers(0, 255, (200, 300), dtype=np.uint8))
     with pytest.raises(CannotCalibrate, match="count the corners where four squares meet"):
-        detect(paths, Board(8, 5, 0.02), workers=1)
+        detect(paths, Board(8, 5, 0.02), **QUICK)

@@ -214,6 +214,17 @@ class BrownConrady(Lens):
     def project_unchecked(self, rays: Array) -> Array:
         return self.distort(rays[..., :2] / rays[..., 2:])
 
+    def ray_jacobian(self, rays: Array) -> Array:
+        xy, depth = rays[..., :2] / rays[..., 2:], rays[..., 2:, None]
+        onto_plane = np.concatenate([np.broadcast_to(np.eye(2), (*xy.shape, 2)), -xy[..., None]], axis=-1) / depth
+        return self.jacobian(xy) @ onto_plane
+
+    def parameter_jacobian(self, name: str, rays: Array) -> Array:
+        if self._tilt is not None or name in ("tau_x", "tau_y"):
+            return super().parameter_jacobian(name, rays)
+        xy = rays[..., :2] / rays[..., 2:]
+        return blockwise(lambda x, y: self._by_coefficient(name, x, y), xy, 2)
+
     # Its domain.
 
     @property
@@ -242,10 +253,11 @@ class BrownConrady(Lens):
 
         It never turns back, or has a pole before it does, at which it is infinite and all images end.
         """
-        N, D = self.numerator, self.denominator
-        # g' = (N D + 2 s (N' D - N D')) / D²
-        rising = N * D + Polynomial([0, 2]) * (N.deriv() * D - N * D.deriv())
-        fold = sqrt(first_positive_root(rising.coef))
+        N, D = (np.asarray(each.coef, dtype=float) for each in (self.numerator, self.denominator))
+        sloping_N, sloping_D = (np.arange(len(each)) * each for each in (N, D))  # s N' and s D'
+        # g' = (N D + 2 (s N' D - N s D')) / D²
+        rising = np.convolve(N, D) + 2 * (np.convolve(sloping_N, D) - np.convolve(N, sloping_D))
+        fold = sqrt(first_positive_root(rising))
         return fold if fold < self.pole_radius else inf
 
     @cached_property
@@ -371,6 +383,22 @@ class BrownConrady(Lens):
             m + y * (m_y + b_slope),
         )
 
+    def _by_coefficient(self, name: str, x: Array, y: Array) -> tuple[Array, Array]:
+        """∂x'/∂name and ∂y'/∂name of a coefficient, before the tilt."""
+        s, zero = x * x + y * y, np.zeros_like(x)
+        of_others = {
+            "p1": (2 * x * y, s + 2 * y * y), "p2": (s + 2 * x * x, 2 * x * y),
+            "s1": (s, zero), "s2": (s * s, zero), "s3": (zero, s), "s4": (zero, s * s),
+        }  # fmt: skip
+        if name in of_others:
+            return of_others[name]
+        number = int(name[1])
+        term = s if number in (1, 4) else s * s if number in (2, 5) else s * s * s
+        share = term / (1 + s * (self.k4 + s * (self.k5 + s * self.k6)))
+        if number > 3:
+            share *= -self._ratio(s)
+        return x * share, y * share
+
     def _distort(self, x: Array, y: Array) -> tuple[Array, Array]:
         x, y = self._polynomial(x, y)
         if self._tilt is None:
@@ -465,8 +493,8 @@ class BrownConrady(Lens):
         """
         r, _, least = self._spokes
         radii = np.concatenate([[0.0], r[:, 0], [inf]])
-        firm, upright = ((least > low).sum(axis=0) for low in (NEARLY_FLAT, 0))
-        firm, upright = (np.stack([np.roll(last, k) for k in (2, 1, 0, -1)]) for last in (firm, upright))
+        beside = (np.arange(least.shape[1]) - np.array([[2], [1], [0], [-1]])) % least.shape[1]
+        firm, upright = ((least > low).sum(axis=0)[beside] for low in (NEARLY_FLAT, 0))
         return 0.99 * radii[firm.min(axis=0)], 1.01 * radii[upright.max(axis=0) + 1]
 
     def _valid(self, x: Array, y: Array) -> np.ndarray:

@@ -68,13 +68,13 @@ class Linearisation(Problem):
         camera, points_first = self.cameras[name], self.points_first[self.posed]
         points_cam = transform(camera.cam_from_world, points_first)
         _, by_point, by_intrinsics = pixel_jacobian(camera, points_cam, self.estimated[name])
-        by_first = by_point @ camera.cam_from_world.rotation.as_matrix()
+        by_first = by_point @ camera.cam_from_world.as_matrix()[:3, :3]
         by_shared = np.zeros((*points_cam.shape[:-1], 2, len(self.parameters)))
         by_shared[..., self.intrinsics_of(name)] = by_intrinsics
         if place := self.place_of(name):
             by_shared[..., place] = by_point @ twist_jacobian(points_cam)
         if self.warp_place:
-            normals = self.first_from_board[self.posed].rotation.as_matrix()[:, None, :, 2:]
+            normals = self.first_from_board.as_matrix()[self.posed, None, :3, 2:3]
             by_shared[..., self.warp_place] = (by_first @ normals) * sagittas(self.board)[:, None, :]
         return by_shared, by_first @ twist_jacobian(points_first)
 

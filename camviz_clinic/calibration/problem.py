@@ -212,7 +212,8 @@ class Problem:
 
 def moved(poses: RigidTransform, points: Array) -> Array:
     """Points (n, 3) by each of v poses, (v, n, 3)."""
-    return points @ np.swapaxes(poses.rotation.as_matrix(), 1, 2) + poses.translation[:, None, :]
+    matrices = poses.as_matrix()
+    return points @ np.swapaxes(matrices[:, :3, :3], 1, 2) + matrices[:, None, :3, 3]
 
 
 def assumed_estimated(camera: Camera) -> tuple[str, ...]:

@@ -25,6 +25,8 @@ MARGIN = 0.6  # white around the board, in `square_size`
 FINER = 2  # samples along each side of a pixel
 BLUR = 0.6  # pixels
 
+Single = NDArray[np.float32]
+
 
 @dataclass(frozen=True, eq=False)
 class Pictured:
@@ -57,32 +59,36 @@ def snapshot(
     camera: Camera, board: Board, cam_from_board: RigidTransform, rng: np.random.Generator, noise: float = 2.0
 ) -> NDArray[np.uint8]:
     """The board at a pose, uint8 grey (height, width), a little out of focus, with noise of this σ in grey levels."""
-    grid, texel = camera.intrinsics, board.square_size / TEXELS
-    paper = BLACK + (WHITE - BLACK) * whiteness(board, TEXELS, MARGIN)
-    left, top = (edge - MARGIN * board.square_size for edge in board.area[:2])
-    to_board = cam_from_board.rotation.as_matrix()  # rows times this are in the board's frame
-    directions, origin = _rays(camera) @ to_board, -cam_from_board.translation @ to_board
-    with np.errstate(divide="ignore", invalid="ignore"):
-        along = -origin[2] / directions[..., 2]
-        x, y = np.moveaxis((origin + along[..., None] * directions)[..., :2], -1, 0)
-    behind = ~(along > 0)
-    across, down = ((np.where(behind, -1e6, at) - edge) / texel - 0.5 for at, edge in ((x, left), (y, top)))
-    seen = cv2.remap(
-        paper.astype(np.float32),
-        across.astype(np.float32),
-        down.astype(np.float32),
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_CONSTANT,
-        borderValue=BEHIND,
-    )
-    picture = seen.reshape(grid.height, FINER, grid.width, FINER).mean(axis=(1, 3))
+    across, down = _seen(camera, board, cam_from_board)
+    paper = (BLACK + (WHITE - BLACK) * whiteness(board, TEXELS, MARGIN)).astype(np.float32)
+    samples = cv2.remap(paper, across, down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=BEHIND)
+    grid = camera.intrinsics
+    picture = cv2.resize(samples, (grid.width, grid.height), interpolation=cv2.INTER_AREA)  # the mean of each pixel's
     picture = cv2.GaussianBlur(picture, (0, 0), BLUR) + rng.normal(0, noise, picture.shape)
     return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
 
 
+def _seen(camera: Camera, board: Board, cam_from_board: RigidTransform) -> tuple[Single, Single]:
+    """The column and the row of the paper that each sample sees, float32 (FINER * height, FINER * width) each."""
+    texel = board.square_size / TEXELS
+    left, top = (edge - MARGIN * board.square_size for edge in board.area[:2])
+    board_from_cam = cam_from_board.inv().as_matrix()[:3] / texel  # in texels
+    x, y, z = np.tensordot(board_from_cam[:, :3].astype(np.float32), _rays(camera), axes=1)
+    start = board_from_cam[:, 3].astype(np.float32)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = -start[2] / z
+    behind = ~(along > 0)
+    for at, first, edge in ((x, start[0], left), (y, start[1], top)):
+        at *= along
+        at += np.float32(first - edge / texel - 0.5)
+        at[behind] = -1e6
+    return x, y
+
+
 @lru_cache(maxsize=1)
-def _rays(camera: Camera) -> Array:
-    """The directions (FINER * height, FINER * width, 3) in which a camera samples."""
+def _rays(camera: Camera) -> Single:
+    """The directions (3, FINER * height, FINER * width), float32, in which a camera samples."""
     grid = camera.intrinsics
     u, v = np.meshgrid(*((np.arange(FINER * side) + 0.5) / FINER - 0.5 for side in (grid.width, grid.height)))
-    return np.asarray(camera.lens.unproject(grid.from_pixels(np.stack([u, v], axis=-1))))
+    rays = camera.lens.unproject(grid.from_pixels(np.stack([u, v], axis=-1)))
+    return np.ascontiguousarray(np.moveaxis(rays, -1, 0), np.float32)

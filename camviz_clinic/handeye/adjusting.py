@@ -163,7 +163,7 @@ class Adjusted:
     def jacobian(self) -> Array:
         """The derivative (poses, points * m, unknowns) of what is expected, by the twists of X and Z and by `also`."""
         by_point = self._measurement[1]
-        by_mount = by_point @ self.X.rotation.as_matrix().T
+        by_mount = by_point @ self.X.as_matrix()[:3, :3].T
         by_X = -by_mount @ twist_jacobian(self.points_mount)
         moved = self.motions.A[:, None, :3, :3].swapaxes(-1, -2) @ twist_jacobian(self.Z.apply(self.measured.points))
         columns = [by_X, by_mount @ moved]

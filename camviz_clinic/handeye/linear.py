@@ -78,7 +78,7 @@ def all_round(motions: Motions, X: Array, scale: float | None) -> list[tuple[Arr
 
 def _turn(A: Array, B: Array) -> Array:
     """R_X (3, 3) of motions (n, 4, 4); half turns have no say unless there is nothing else."""
-    alpha, beta = (Rotation.from_matrix(each[:, :3, :3]).as_rotvec() for each in (A, B))
+    alpha, beta = np.split(Rotation.from_matrix(np.concatenate([A, B])[:, :3, :3]).as_rotvec(), 2)
     clear = np.maximum(np.linalg.norm(alpha, axis=1), np.linalg.norm(beta, axis=1)) < NEAR_HALF_TURN
     if clear.sum() >= 2:
         alpha, beta = alpha[clear], beta[clear]
