@@ -2,10 +2,11 @@
 
 import hashlib
 
-import cv2
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
+
+from camviz_clinic.calibration import chessboards
 
 # Two cores shared by several workers: no deadlines. The same examples on every run, so that a red run can be repeated.
 settings.register_profile(
@@ -40,27 +41,26 @@ def room(tmp_path, monkeypatch):
 
 
 @pytest.fixture(scope="session", autouse=True)
-def each_picture_is_searched_once():
-    """OpenCV's search for a chessboard, 0.3 s a photograph, answers at once when it is asked the same again.
+def each_photograph_is_searched_once():
+    """The search for a chessboard, 0.3 s a photograph, answers at once when it is asked the same again.
 
     So that it is asked in this process, `detect` takes one process unless it is given `workers`.
     """
     with pytest.MonkeyPatch.context() as patched:
-        for name in ("findChessboardCorners", "findChessboardCornersSB", "findChessboardCornersSBWithMeta"):
-            patched.setattr(cv2, name, remembered(getattr(cv2, name)))
+        patched.setattr(chessboards, "find_chessboard", remembered(chessboards.find_chessboard))
         patched.setattr("camviz_clinic.calibration.detection.processors", lambda: 1)
         yield
 
 
 def remembered(search):
-    """A search in a picture that keeps its answers, by the picture's pixels and the other arguments."""
+    """`find_chessboard` with its answers kept, by the picture's pixels and what is looked for."""
     answers = {}
 
-    def asked(picture, *how, **named):
-        pixels = hashlib.sha256(np.ascontiguousarray(picture)).digest()
-        key = (pixels, picture.shape, str(picture.dtype), how, tuple(sorted(named.items())))
+    def asked(gray, board, finder="auto"):
+        pixels = hashlib.sha256(np.ascontiguousarray(gray)).digest()
+        key = (pixels, gray.shape, str(gray.dtype), tuple(sorted(vars(board).items())), finder)
         if key not in answers:
-            answers[key] = search(picture, *how, **named)
-        return tuple(np.copy(part) if isinstance(part, np.ndarray) else part for part in answers[key])
+            answers[key] = search(gray, board, finder)
+        return None if answers[key] is None else answers[key].copy()
 
     return asked
