@@ -1,6 +1,6 @@
 """How often `unidentifiable` names what the corners of a set cannot decide, and how often it does so in healthy sets.
 
-    python tools/benchmarks/undecided.py [COUNT]     a table (default: 50 of each)
+    python tools/benchmarks/undecided.py [COUNT [WORDS …]]     a table (default: 50 of each), of kinds with such words
 
 "Named" counts the sets with the finding, a note being one too. "± of the picture" is one standard deviation of the
 worst combination in per cent of the picture's longer side, decided or not: median, and least and most; 1 is the limit.
@@ -84,8 +84,9 @@ def main(arguments: list[str]) -> None:
     """Run what is asked for."""
     cv2.setNumThreads(1)
     count = int(arguments[0]) if arguments else COUNT
+    chosen = {name: make for name, make in sets().items() if not arguments[1:] or any(w in name for w in arguments[1:])}
     head = ["virtual sets", "named", "as a warning", "± of the picture, %", "a corner moves by"]
-    print(table(head, [line(name, make, count) for name, make in sets().items()]))
+    print(table(head, [line(name, make, count) for name, make in chosen.items()]))
 
 
 if __name__ == "__main__":
