@@ -50,6 +50,17 @@ def test_where_the_poses_follow_the_change_no_corner_moves_by_more_than_is_said(
     assert left.max() < 0.005 * moved.max()
 
 
+def test_how_far_the_farthest_corner_moves_is_so_to_first_order():
+    """A twentieth of the change, where what is quadratic in it has gone: the poses solved for anew, and the longest."""
+    problem, step = exact(4), 0.05
+    one = undecided(problem, "camera", NOISE)[0]
+    camera = problem.cameras["camera"]
+    values = {key: parameter(camera, key) + step * by for key, by in zip(one.names, one.direction, strict=True)}
+    changed = replace(problem, cameras={"camera": with_parameters(camera, values)}).refined(only_poses=True)
+    left = np.linalg.norm(changed.residuals["camera"], axis=-1).max()
+    assert left / step == pytest.approx(one.most, rel=0.15)
+
+
 def test_the_standard_deviation_is_the_scatter_of_many_solutions():
     """Boards tilted by up to 4°, so that a solution does not run away: fx of 24 sets of noise."""
     problem, rng = exact(4), np.random.default_rng(5)
