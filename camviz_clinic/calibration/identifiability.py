@@ -58,7 +58,7 @@ def undecided(adjustment: Adjustment, name: str, noise: float) -> tuple[Undecide
     >>> for tilt in (40, 1):  # degrees, to all sides
     ...     set_up = single(rng, tilt_deg=(0, tilt))
     ...     solved = set_up.solved(set_up.observed(rng))
-    ...     [list(each.changes) for each in undecided(Adjustment.of(solved), "camera", set_up.noise)]
+    ...     [list(each.changes) for each in undecided(Adjustment.of(solved), "camera", set_up.noise)[:1]]  # the worst
     []
     [['fx', 'fy']]
     """
