@@ -120,7 +120,8 @@ def test_the_test_over_views_is_tried_at_its_threshold(monkeypatch):
     chance = probability_by_views(flat)
     bent = probability_by_views(replace(flat, warp=np.zeros(2)).refined())
     for limit, earned in ((max(chance, bent) * 1.001, True), (min(chance, bent) * 0.999, False)):
-        monkeypatch.setattr(board_warp, "FALSE_ALARMS", limit)
+        for name in ("FALSE_ALARMS", "CERTAIN"):
+            monkeypatch.setattr(board_warp, name, limit)
         assert earns_its_place(flat) is earned
 
 
@@ -130,9 +131,20 @@ def test_five_views_are_too_few_and_six_are_not():
     assert probability_by_views(bent.only(range(5)).refined()) == 1
 
 
+def test_where_the_views_are_certain_held_out_views_are_not_asked(monkeypatch):
+    """A bend of which one flat board in a thousand would have the like is taken in, whatever the folds say."""
+    flat = problem(1, warp=BENT)
+    assert probability_by_views(flat) < board_warp.CERTAIN
+    monkeypatch.setattr(board_warp, "held_out_rms", lambda one, folds: float(one.warp is not None))
+    assert earns_its_place(flat)
+    monkeypatch.setattr(board_warp, "CERTAIN", 0.0)
+    assert not earns_its_place(flat)
+
+
 def test_a_bend_that_foretells_held_out_views_worse_is_left_out(monkeypatch):
     """With the test over views passed by all, the errors of held-out views alone decide, one way and the other."""
     monkeypatch.setattr(board_warp, "FALSE_ALARMS", 1.0)
+    monkeypatch.setattr(board_warp, "CERTAIN", 0.0)
     decided = []
     for seed in (500, 501):
         flat = problem(seed, 6)

@@ -261,7 +261,7 @@ def test_the_json_has_the_form_that_the_documentation_gives(left_classic):
 def test_the_worst_comes_first_and_a_healthy_calibration_says_what_was_checked(healthy):
     _, calibration = healthy
     said = inspect(calibration).as_text()
-    assert said.startswith("Nothing wrong was found; 27 checks ran, 10 could not because the file holds one camera")
+    assert said.startswith("Nothing wrong was found; 28 checks ran, 10 could not because the file holds one camera")
     assert "\nNext: " in said
     assert "\nChecked: assumed-coefficients, assumed-reading, not-a-rotation, bad-k" in said
     K = calibration.cameras["camera"]

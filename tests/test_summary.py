@@ -54,14 +54,14 @@ def changed(lens=None, **pinhole):
 
 
 def test_a_healthy_calibration_says_that_nothing_is_wrong_by_how_many_checks_and_why_not_by_more(solved):
-    assert inspect(solved).verdict == f"Nothing wrong was found, 2 notes below; 27 checks ran, {SKIPPED}."
+    assert inspect(solved).verdict == f"Nothing wrong was found, 2 notes below; 28 checks ran, {SKIPPED}."
 
 
 def test_of_many_reasons_the_verdict_gives_two_and_counts_the_rest():
     inspection = inspect(bare())
     reasons = {why for _, why in inspection.skipped}
     assert inspection.verdict.startswith(
-        "Nothing wrong was found; 12 checks ran, 25 could not because the file holds no"
+        "Nothing wrong was found; 12 checks ran, 26 could not because the file holds no"
     )
     assert inspection.verdict.endswith(f"({len(reasons) - 2} more reasons below).")
 

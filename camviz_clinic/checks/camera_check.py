@@ -87,7 +87,9 @@ def _judged(refit: Refit, limit: float, names: tuple[str, ...], covariance: Arra
     verdict, missing = rated(least, most, limit), gaps(refit.camera, refit.corners)
     if verdict in ("fail", "warn") and refit.pattern < limit / 2 and refit.explained_by(names, covariance):
         known = reach(far_columns(refit.camera, names), np.asarray(covariance))
-        reason = f"{off}, which its own uncertainty explains: it was never known better than to {px(known)}"
+        longer = max(refit.camera.intrinsics.width, refit.camera.intrinsics.height)
+        how = f"known better than to {px(known)}" if known < longer else "decided by its own views"
+        reason = f"{off}, which its own uncertainty explains: it was never {how}"
         return "warn", reason, "a calibration from more views."
     if verdict == "fail":
         return "fail", f"the calibration does not describe this camera: {off}, surely by more than {px(least)}", ""
@@ -119,15 +121,19 @@ def _facts(refit: Refit) -> tuple[str, ...]:
     """The numbers in words."""
     values = refit.values()
     (fx, fx_now, sigma), (cx, cx_now, cx_sigma), (cy, cy_now, cy_sigma) = (values[key] for key in ("fx", "cx", "cy"))
+    told = {"fx": f"{sigma / fx:.2%}", "cx": f"{cx_sigma:.2f}", "cy": f"{cy_sigma:.2f}"}
+    told |= dict.fromkeys(set(told) & set(refit.undecided), "not known")
     facts = [
         f"evidence: {refit.views} views, {len(refit.corners)} corners, {refit.set_aside:.1%} set aside; residuals of "
         f"{px(refit.sigma)} in each coordinate, counted less six for each pose.",
         f"over the image: {px(np.median(refit.lengths))} (median), {px(np.percentile(refit.lengths, 95))} (95 %);"
         f" chance alone shows up to {px(refit.noise)}.",
-        f"solved anew: fx changes by {fx_now / fx - 1:+.2%} (± {sigma / fx:.2%}), the principal point by "
-        f"({cx_now - cx:+.2f}, {cy_now - cy:+.2f}) px (± {cx_sigma:.2f}, {cy_sigma:.2f}). It lessens the squares with "
+        f"solved anew: fx changes by {fx_now / fx - 1:+.2%} (± {told['fx']}), the principal point by "
+        f"({cx_now - cx:+.2f}, {cy_now - cy:+.2f}) px (± {told['cx']}, {told['cy']}). It lessens the squares with "
         f"F = {refit.F:.3g}, which independent noise does {refit.chance:.1g} of the time.",
     ]
+    if refit.undecided:
+        facts.append(f"the new views do not decide {listed(refit.undecided)}: boards tilted to different sides would.")
     if refit.scatter > 2:
         facts.append(
             f"the views differ {refit.scatter:.2g} times as much as their noise explains, in variance: a board that "
@@ -140,7 +146,8 @@ def _numbers(refit: Refit) -> dict[str, object]:
     """The same for programs."""
     least, most = refit.bounds
     parameters = {
-        key: {"calibrated": was, "now": now, "sigma": sigma} for key, (was, now, sigma) in refit.values().items()
+        key: {"calibrated": was, "now": now, "sigma": None if key in refit.undecided else sigma}
+        for key, (was, now, sigma) in refit.values().items()
     }
     return {
         "views": refit.views,

@@ -12,6 +12,7 @@ import numpy as np
 from camviz.cameras import Camera
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.identifiability import Undecided, undecided
 from camviz_clinic.calibration.stamp import Stamp
 from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.checks.doctor.shown import Shown
@@ -146,6 +147,26 @@ class Evidence:
             return None
         place = names.index(parameter)
         return float(np.sqrt(max(adjustment.covariance[place, place], 0)))
+
+    def undecided(self, name: str) -> tuple[Undecided, ...]:
+        """Combinations of a camera's intrinsics that its corners do not decide, the worst first; () without corners."""
+        return self.once(("undecided", name), lambda: self._undecided(name))
+
+    def _undecided(self, name: str) -> tuple[Undecided, ...]:
+        if name not in self.observed:
+            return ()
+        observed = self.observed[name]
+        return undecided(self._with_others(name) or observed.adjustment, name, observed.noise)
+
+    def _with_others(self, name: str) -> Adjustment | None:
+        """A camera's adjustment with all that saw the board beside it, which tell of the board's poses, if any did."""
+        seen_by = [each for each in self.observed if each in self.calibration.cam_from_board]
+        if name not in seen_by or len(seen_by) < 2:
+            return None
+        try:
+            return self.adjustment(*seen_by)
+        except ValueError:  # the cameras have other views each
+            return None
 
     def focal_uncertainty(self, name: str) -> float | None:
         """The standard deviation of fx over fx; None where it is unknown."""

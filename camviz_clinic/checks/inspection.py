@@ -147,7 +147,9 @@ class Inspection:
         pinhole = {key: getattr(grid, key) for key in ("width", "height", "fx", "fy", "cx", "cy")}
         distortion = {key: float(value) for key, value in asdict(lens).items()}
         stamp = self.calibration.stamps.get(name) if self.calibration else None
-        told = {"distortion": distortion, "rms": rms} | ({"stamp": stamp.known()} if stamp else {})
+        undecided = self.summary.undecided(name) if self.summary else ()
+        told = {"distortion": distortion, "rms": rms} | ({"undecided": list(undecided)} if undecided else {})
+        told |= {"stamp": stamp.known()} if stamp else {}
         return {"name": name, "model": type(lens).__name__} | pinhole | told
 
     @cached_property

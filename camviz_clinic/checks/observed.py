@@ -66,6 +66,12 @@ class Observed:
         """The standard deviation in pixels of one coordinate, from the median, which a few bad corners do not move."""
         return robust_sigma(self.residuals)
 
+    @property
+    def noise(self) -> float:
+        """The same with what the parameters take of it given back; infinite where they may take all of it."""
+        left = self.adjustment.measurements - self.adjustment.unknowns
+        return self.scatter * float(np.sqrt(self.adjustment.measurements / left)) if left > 0 else np.inf
+
     @cached_property
     def best(self) -> Adjustment:
         """At the numbers that these corners ask for, without the corners that are far out."""

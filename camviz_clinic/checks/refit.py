@@ -14,6 +14,7 @@ from camviz.lenses.base import Array
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.detection import seen
 from camviz_clinic.calibration.difference import pixel_grid
+from camviz_clinic.calibration.identifiability import undecided
 from camviz_clinic.calibration.jacobian import PINHOLE, parameter, pixel_jacobian, twist_jacobian
 from camviz_clinic.calibration.types import Board, Mask
 from camviz_clinic.checks.fields import smooth_field
@@ -169,6 +170,12 @@ class Refit:
         follow = np.linalg.lstsq(self._columns, far_columns(self.free.cameras[self.name], names), rcond=None)[0]
         total = self.covariance + follow @ covariance @ follow.T
         return bool(self._delta @ np.linalg.solve(total, self._delta) < chdtri(len(total), 1 - SURE))
+
+    @cached_property
+    def undecided(self) -> tuple[str, ...]:
+        """Parameters that the new views do not decide, so that solving anew tells no ± of them."""
+        found = undecided(self.free, self.name, self.free.by_corners.sigma)
+        return tuple(dict.fromkeys(key for each in found for key in each.changes))
 
     def values(self) -> dict[str, tuple[float, float, float]]:
         """By parameter: as calibrated, as solved anew, and the standard deviation of the latter."""

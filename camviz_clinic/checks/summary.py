@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from camviz_clinic.calibration.guidance import instruction, next_board_poses
 from camviz_clinic.calibration.types import Calibration
 from camviz_clinic.calibration.uncertainty import largest_expected_error, projection_uncertainty
 from camviz_clinic.checks.evidence import Evidence
+from camviz_clinic.checks.judgement import listed
 from camviz_clinic.checks.stamps import holds_for
 from camviz_clinic.checks.task import TaskError, task_errors
 
@@ -137,17 +139,37 @@ class Summary:
         grid, lens = camera.intrinsics, camera.lens
         rms, known = self.rms(name), self.uncertainty[name]
         yield RMS, UNKNOWN if rms is None else f"{rms:.3f} px"
-        middle, corner = (UNKNOWN,) * 2 if known is None else map(_pixels, known)
+        longer = max(grid.width, grid.height)
+        middle, corner = (UNKNOWN,) * 2 if known is None else (_pixels(each, longer) for each in known)
         yield MIDDLE, middle
         yield CORNER, corner
         yield "image", f"{grid.width} × {grid.height} px"
         yield "lens", type(lens).__name__
         values = {key: getattr(grid, key) for key in ("fx", "fy", "cx", "cy", "skew")} | _parameters(lens)
         for key, value in values.items():
-            sigma = self.evidence.sigma_of(name, key)
+            sigma = inf if key in self.undecided(name) else self.evidence.sigma_of(name, key)
             if sigma is not None or value or key in ("cx", "cy"):
                 yield key, measured(value, sigma)
         yield from self.bend.items()
+
+    def undecided(self, name: str) -> tuple[str, ...]:
+        """The parameters of a camera whose ± is withheld, because its corners do not decide them (`unidentifiable`)."""
+        found = {key for each in self.evidence.undecided(name) for key in each.changes}
+        return (
+            tuple(key for key in self.evidence.observed[name].adjustment.estimated[name] if key in found)
+            if found
+            else ()
+        )
+
+    @property
+    def withheld(self) -> tuple[str, ...]:
+        """Why a ± is not told, in a sentence for every camera that lacks one."""
+        lacking = {name: listed(self.undecided(name)) for name in self.names if self.undecided(name)}
+        return tuple(
+            f"{name}: the ± of {keys} is not known, because the corners do not decide "
+            f"{'them' if ' ' in keys else 'it'} (unidentifiable)."
+            for name, keys in lacking.items()
+        )
 
     @property
     def bend(self) -> dict[str, str]:
@@ -181,6 +203,7 @@ class Summary:
             pinhole = ", ".join(f"{key} = {rows[key]}" for key in ("fx", "fy", "cx", "cy"))
             others = "; ".join(f"{key} {rows[key]}" for key in (RMS, MIDDLE, CORNER) if rows[key] != UNKNOWN)
             yield f"{name}: {pinhole} px{'; ' * bool(others)}{others}."
+        yield from self.withheld
         if self.bend_sentence:
             yield self.bend_sentence
         for each in self.task:
@@ -193,7 +216,9 @@ class Summary:
             return "Nothing needs doing that this file could tell: it lacks the corners, which camviz calibrate keeps."
         name = max(self.largest_errors, key=lambda each: self.largest_errors[each])
         largest, of = self.largest_errors[name], "" if len(self.names) == 1 else f" of {name}"
-        said = f"where it is worst{of}, a far point is expected to be {largest:.2g} px off (Max ERE)"
+        longer = max(self.calibration.cameras[name].intrinsics.width, self.calibration.cameras[name].intrinsics.height)
+        off = f"{largest:.2g} px off" if largest < longer else "farther off than the picture is long"
+        said = f"where it is worst{of}, a far point is expected to be {off} (Max ERE)"
         if largest <= self.goal:
             return f"There are enough pictures: {said}, within the goal of {self.goal:g} px."
         try:
@@ -208,13 +233,13 @@ class Summary:
 
 
 def measured(value: float, sigma: float | None) -> str:
-    """A number with its standard deviation, both to the second digit of that: "532.92 ± 0.41".
+    """A number with its standard deviation, both to the second digit of that; infinite is one that is not known.
 
-    >>> measured(532.9187, 0.4112), measured(0.0828, 0.000213), measured(0.25, None), measured(1, 0)
-    ('532.92 ± 0.41', '0.08280 ± 0.00021', '0.25', '1 ± 0')
+    >>> measured(532.9187, 0.4112), measured(0.0828, 0.000213), measured(0.25, None), measured(1, 0), measured(7, inf)
+    ('532.92 ± 0.41', '0.08280 ± 0.00021', '0.25', '1 ± 0', '7 ± not known')
     """
-    if sigma is None:
-        return f"{value:.6g}".replace("-", "−")
+    if sigma is None or sigma == inf:
+        return f"{value:.6g}{' ± not known' * (sigma is not None)}".replace("-", "−")
     if not (np.isfinite(sigma) and sigma > 0):
         return f"{value:.6g} ± {sigma:g}".replace("-", "−")
     decimals = int(np.clip(1 - np.floor(np.log10(sigma)), 0, 9))
@@ -225,5 +250,8 @@ def _parameters(lens: Any) -> dict[str, float]:
     return {key: float(getattr(lens, key)) for key in lens.parameters()}
 
 
-def _pixels(sigma: float) -> str:
-    return f"±{sigma:.2g} px" if np.isfinite(sigma) else "no ray"
+def _pixels(sigma: float, longer: float) -> str:
+    """An uncertainty in a picture that is so long."""
+    if not np.isfinite(sigma):
+        return "no ray"
+    return f"±{sigma:.2g} px" if sigma < longer else "not known"

@@ -21,6 +21,7 @@ from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.rig import pairs
 
 DEPTHS = (1.0, 2.0, 5.0, 10.0)  # metres, of which a pair's depth error is told
+ANYWHERE_DEG = 90.0  # of a direction that may be any
 MATCHING_PX = 0.25  # the standard deviation of a match that is taken for granted; its part of the error grows with it
 
 
@@ -84,7 +85,12 @@ def _of_camera(adjustment: Adjustment, name: str, at: float | None) -> TaskError
     middle, worst = np.degrees(middle_and_worst(inf))
     if not np.isfinite(middle):
         return TaskError((name,), "", {})
-    known = f"±{worst:.2g}° in its worst corner" if np.isfinite(worst) else "a corner of it has no ray"
+    if middle > ANYWHERE_DEG:
+        return TaskError(
+            (name,), f"{name}: the direction to a far point is not known.", {"angle_centre_deg": float(middle)}
+        )
+    known = "not known in its worst corner" if worst > ANYWHERE_DEG else f"±{worst:.2g}° in its worst corner"
+    known = known if np.isfinite(worst) else "a corner of it has no ray"
     said = f"{name}: the direction to a far point is known to ±{middle:.2g}° in the middle of the picture, {known}"
     values = {"angle_centre_deg": middle, "angle_corner_deg": worst}
     if at is not None:

@@ -55,9 +55,9 @@ Finds a board (a chessboard, a ChArUco board, Kalibr's AprilGrid, a grid of circ
 camera that took them, or with --right for a pair of cameras. IMAGES are files, folders, or patterns such as
 'left*.jpg'. Pictures without the board, of another size, or that cannot be read are named and skipped. Corners and
 whole views that contradict the rest are set aside, named, and kept in the file. The board's bend is solved for, too,
-where the views agree on it and it foretells views that were held out better. What is written is OpenCV's YAML, with all
-that a later inspection needs. With --report, or where a gate is given, the calibration is inspected as well; findings
-make it fail only where there is a gate.
+where the views agree on it; where they agree less clearly, it must foretell views that were held out better. What is
+written is OpenCV's YAML, with all that a later inspection needs. With --report, or where a gate is given, the
+calibration is inspected as well; findings make it fail only where there is a gate.
 
 With --corners nothing is looked for in pictures: the corners come from files of other programs, which docs/formats.md
 lists. --board, --square-mm and --size say what those files do not hold. IMAGES are then for the report alone, and

@@ -14,14 +14,19 @@ def report(calibration: Calibration) -> list[str]:
     """What came out, in sentences."""
     from camviz_clinic.checks.summary import Summary
 
+    summary = Summary.of(calibration)
     said = [f"{picture}: skipped, {why}." for picture, why in calibration.skipped]
     said += calibration.notes
     for name, camera in calibration.cameras.items():
         deviations = np.sqrt(np.diag(calibration.intrinsics_covariance[name]))
-        of = dict(zip(calibration.estimated[name], deviations, strict=True))
+        undecided = summary.undecided(name)
+        of = {
+            key: "not known" if key in undecided else f"{deviation:.2f}"
+            for key, deviation in zip(calibration.estimated[name], deviations, strict=True)
+        }
         grid = camera.intrinsics
         values = [
-            f"{key} = {getattr(grid, key):.2f}" + (f" ± {of[key]:.2f}" if key in of else "")
+            f"{key} = {getattr(grid, key):.2f}" + (f" ± {of[key]}" if key in of else "")
             for key in ("fx", "fy", "cx", "cy")
         ]
         used = calibration.used(name)
@@ -30,7 +35,8 @@ def report(calibration: Calibration) -> list[str]:
             f"{name}: {', '.join(values)} px; RMS error {calibration.rms(name):.3f} px over {used.sum()} corners in "
             f"{views} views."
         )
-    if bend := Summary.of(calibration).bend_sentence:
+    said += summary.withheld
+    if bend := summary.bend_sentence:
         said.append(bend)
     if "right" in calibration.cameras:
         x, y, z = 1000 * calibration.cameras["right"].centre

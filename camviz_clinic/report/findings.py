@@ -48,7 +48,8 @@ def glance_html(summary: Summary) -> str:
     few = f"<p>The first {len(table)} of {len(table) + more} cameras.</p>" if more else ""
     task = "".join(f"<p>{escape(each.sentence)}</p>" for each in summary.task)
     holds = "".join(f"<p>{escape(sentence)}</p>" for sentence in summary.holds)
-    notes = "".join(f'<p class="note">{escape(note)}</p>' for note in summary.calibration.notes)
+    said = (*summary.withheld, *summary.calibration.notes)
+    notes = "".join(f'<p class="note">{escape(note)}</p>' for note in said)
     return (
         f'<p class="origin">{escape(" · ".join(summary.origin))}</p>{holds}<div class="scroll" style="overflow-x:auto">'
         f'<table class="glance"><tr><td></td>{head}</tr>{body}</table></div>{few}<p>{LEGEND}</p>{task}{notes}'

@@ -18,7 +18,7 @@ from camviz_clinic.checks.registry import Fault, Kind
 
 ORDER = (
     *("compare", "assumed", "file", "impossible", "contradiction", "size", "settings", "lens"),
-    *("corners", "set_aside", "boards", "moving", "model", "scatter", "pair", "frames", "described"),
+    *("corners", "set_aside", "boards", "unidentifiable", "moving", "model", "scatter", "pair", "frames", "described"),
 )
 """The modules in the order of their checks; others come after them, by name. Within one the order is as written."""
 

@@ -25,6 +25,7 @@ CELLS = 64  # along the longer side of the image, to measure areas
 WIDEST = radians(110)  # off the axis: the widest common fisheyes see 220°
 SAME_WAY_DEG = 20.0  # between the normals of two boards
 UNCERTAIN = 0.01  # of the focal length
+UNKNOWN = 1.0  # of it
 HELD_OUT = 2.0  # times what noise leads to
 FEWEST_VIEWS = 3
 
@@ -37,7 +38,7 @@ FEWEST_VIEWS = 3
     causes=("views that all show the board in the same part of the image, or far away",),
     remedy="Add views with the board close to each border and corner of the image.",
     threshold="They cover less than two fifths of the image, or of what a fisheye of 220° fills of it.",
-    explains=("fold", "near-pole", "inverse-not-converged"),
+    explains=("unidentifiable", "fold", "near-pole", "inverse-not-converged"),
 )
 def low_coverage(evidence: Evidence) -> Iterator[Finding]:
     """The check lays the outlines of the board in all views over the image."""
@@ -110,7 +111,7 @@ def boards_in_the_middle(rng: Rng, strength: float) -> Evidence:
     causes=("boards that were all held parallel to each other, usually to the image",),
     remedy="Add views with the board tilted by 30° to 45°, to different sides.",
     threshold="No two boards are more than 20° apart, or the focal length is uncertain by more than 1 %.",
-    explains=("aspect", "principal-point", "split-disagreement"),
+    explains=("unidentifiable", "aspect", "principal-point", "split-disagreement"),
 )
 def parallel_boards(evidence: Evidence) -> Iterator[Finding]:
     """The check compares the normals of the boards in the camera's frame."""
@@ -122,7 +123,7 @@ def parallel_boards(evidence: Evidence) -> Iterator[Finding]:
         spread = float(np.degrees(np.arccos(np.clip(normals @ normals.T, -1, 1).min())))
         uncertain = evidence.focal_uncertainty(name)
         if spread < SAME_WAY_DEG:
-            more = "" if uncertain is None else f" The focal length is uncertain by {uncertain:.2%} (1σ)."
+            more = "" if uncertain is None else f" The focal length is {_told(uncertain)}."
             sentence = f"{name}: no two of the {len(pose)} boards differ by more than {spread:.1f}° in tilt.{more}"
             yield parallel_boards.found(sentence, spread, "°", name)
         elif (open_left := _left_open(evidence, name)) is not None and open_left > UNCERTAIN:
@@ -131,6 +132,10 @@ def parallel_boards(evidence: Evidence) -> Iterator[Finding]:
                 f"differ by up to {spread:.0f}°."
             )
             yield parallel_boards.found(sentence, open_left * 100, "%", name)
+
+
+def _told(uncertain: float) -> str:
+    return f"uncertain by {uncertain:.2%} (1σ)" if uncertain < UNKNOWN else "not known"
 
 
 def _left_open(evidence: Evidence, name: str) -> float | None:
