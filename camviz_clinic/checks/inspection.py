@@ -148,6 +148,8 @@ class Inspection:
         distortion = {key: float(value) for key, value in asdict(lens).items()}
         stamp = self.calibration.stamps.get(name) if self.calibration else None
         told = {"distortion": distortion, "rms": rms} | ({"stamp": stamp.known()} if stamp else {})
+        if delay := self.calibration.line_delays.get(name) if self.calibration else None:
+            told["line_delay"] = {"us": 1e6 * delay.seconds, "sigma_us": delay.sigma and 1e6 * delay.sigma}
         return {"name": name, "model": type(lens).__name__} | pinhole | told
 
     @cached_property

@@ -56,14 +56,20 @@ def pictured(
 def snapshot(
     camera: Camera, board: Board, cam_from_board: RigidTransform, rng: np.random.Generator, noise: float = 2.0
 ) -> NDArray[np.uint8]:
-    """The board at a pose, uint8 grey (height, width), a little out of focus, with noise of this σ in grey levels."""
+    """The board at a pose, uint8 grey (height, width), a little out of focus, with noise of this σ in grey levels.
+
+    With one pose for each row, each row is read at its own, as a rolling shutter does it.
+    """
     grid, texel = camera.intrinsics, board.square_size / TEXELS
     paper = BLACK + (WHITE - BLACK) * whiteness(board, TEXELS, MARGIN)
     left, top = (edge - MARGIN * board.square_size for edge in board.area[:2])
     to_board = cam_from_board.rotation.as_matrix()  # rows times this are in the board's frame
-    directions, origin = _rays(camera) @ to_board, -cam_from_board.translation @ to_board
+    if to_board.ndim == 3:
+        to_board = np.repeat(to_board, FINER, axis=0)
+    shift = cam_from_board.translation if to_board.ndim == 2 else np.repeat(cam_from_board.translation, FINER, axis=0)
+    directions, origin = _rays(camera) @ to_board, -shift[..., None, :] @ to_board
     with np.errstate(divide="ignore", invalid="ignore"):
-        along = -origin[2] / directions[..., 2]
+        along = -origin[..., 2] / directions[..., 2]
         x, y = np.moveaxis((origin + along[..., None] * directions)[..., :2], -1, 0)
     behind = ~(along > 0)
     across, down = ((np.where(behind, -1e6, at) - edge) / texel - 0.5 for at, edge in ((x, left), (y, top)))
