@@ -39,6 +39,8 @@ def test_a_film_gives_camera_and_delay_in_words_in_the_file_and_as_json(film, ca
     assert main(["calibrate", "film.avi", *WORDS, "--rolling-shutter", "estimate"]) == 0
     said = capsys.readouterr().out
     assert "Rolling shutter: a row is read every 10" in said
+    assert "Is the board as described?" not in said  # the corners kept are not those of the pictures
+    assert "frames do not show the board" in said
     found = camviz_clinic.load("camera.yaml")
     delay = found.line_delays["camera"]
     assert abs(delay.seconds - READOUT_S / 240) < 4 * delay.sigma

@@ -151,10 +151,7 @@ def with_rolling_shutter(
         refuse_unless_by_rows(solved)
     if board_warp != "off":
         bent = settled(replace(solved, warp=np.zeros(2)), robust)
-        sagittas = [
-            abs(value) / bent.deviation(key) for key, value in zip(bent.parameters[-2:], bent.warp, strict=True)
-        ]
-        solved = bent if board_warp == "on" or max(sagittas) > BENT else solved
+        solved = bent if board_warp == "on" or _is_bent(bent) else solved
     return _calibration(name, start, film, solved, pieces)
 
 
@@ -318,7 +315,7 @@ def _calibration(
         set_aside={name: aside[there]},
         estimated={name: solved.estimated},
         intrinsics_covariance={name: solved.covariance[intrinsics, intrinsics]},
-        skipped=film.detections.skipped,
+        skipped=(),
         board_warp=solved.warp,
         board_warp_covariance=None if solved.warp is None else solved.covariance[-2:, -2:],
         line_delays={name: delay},
@@ -331,6 +328,8 @@ def _notes(film: Filmed, solved: RollingAdjustment, pieces: list[Indices], delay
         f"Rolling shutter: {delay.sentence}; solved from {count} frames in {len(pieces)} stretches. The corners kept "
         "are where a shutter of all rows at once would have seen them."
     )
+    if film.detections.skipped:
+        yield f"{len(film.detections.skipped)} frames do not show the board, or not well enough for its corners."
     if count < total:
         yield (
             f"{total - count} of {total} frames that show the board were left out: fewer than {FEWEST_FRAMES} follow "

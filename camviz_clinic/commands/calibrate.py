@@ -202,7 +202,7 @@ def _of_stills(options: argparse.Namespace, of_films: tuple[str, ...]) -> int:
         told(sentence)
     for sentence in worth(calibration, options.goal):
         told(sentence)
-    if doctored := "" if options.rig else _prescribed(shots, options, calibration):
+    if doctored := "" if options.rig or is_rolling(options) else _prescribed(shots, options, calibration):
         told(f"Is the board as described? {doctored}")
     told(f"{options.output}: written.{' ' * bool(left_out)}{' '.join(left_out)}")
     decides = gate.asked or options.junit is not None

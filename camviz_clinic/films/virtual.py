@@ -79,8 +79,8 @@ class Take:
             poses = self.at((times[:, None] + late).ravel())
             seen = self.camera.project(poses.apply(np.tile(points, (len(times), 1)))).reshape(*late.shape, 2)
             late = row_s * (np.nan_to_num(seen[..., 1]) - (grid.height - 1) / 2)
-        inside = ((seen >= 0) & (seen <= [grid.width - 1, grid.height - 1])).all(axis=-1)
-        return np.where(inside[..., None], seen, np.nan)
+        inside = np.all((seen >= 0) & (seen <= [grid.width - 1, grid.height - 1]), axis=-1, keepdims=True)
+        return np.where(inside, seen, np.nan)
 
     def pictures(self, rng: np.random.Generator, noise: float = 2.0, moments: int = 4) -> Iterator[NDArray[np.uint8]]:
         """The frames, uint8 grey (height, width), each of so many moments between its first row and its last."""
@@ -116,8 +116,8 @@ class SmoothTake(Take):
     def _picture(self, time_s: float, rng: np.random.Generator, noise: float, moments: int) -> NDArray[np.uint8]:
         """Sharp, each row at the pose of its own time; the middle row is read at `time_s`."""
         height = self.camera.intrinsics.height
-        late = self.readout_s / height * (np.arange(height) - (height - 1) / 2)
-        return snapshot(self.camera, self.board, self.at(time_s + late), rng, noise)
+        late = self.readout_s / height * (np.arange(height, dtype=np.float64) - (height - 1) / 2)
+        return snapshot(self.camera, self.board, self.at(np.asarray(time_s + late)), rng, noise)
 
 
 def take(
