@@ -16,6 +16,7 @@ from camviz.poses import RigidTransform
 from camviz_clinic.calibration.boards import kind_of
 from camviz_clinic.calibration.boards.aprilgrid import FAMILY
 from camviz_clinic.calibration.denominator_prior import DenominatorPrior
+from camviz_clinic.calibration.line_delay import LineDelay
 from camviz_clinic.calibration.redundancy import Redundancy
 from camviz_clinic.calibration.stamp import Stamp
 
@@ -172,6 +173,8 @@ class Calibration:
         faults: What was mended in reading, where `load` was asked to mend.
         redundant: What the file says twice, in its order.
         stamps: What the calibration of each camera holds for.
+        line_delays: How long each camera's rolling shutter takes from row to row, where that is known. The corners are
+            then where a shutter of all rows at once would have seen them.
 
     Raises: ValueError without any camera.
 
@@ -202,6 +205,7 @@ class Calibration:
     faults: tuple[CalibrationError, ...] = ()
     redundant: tuple[Redundancy, ...] = ()
     stamps: Mapping[str, Stamp] = field(default_factory=dict)
+    line_delays: Mapping[str, LineDelay] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.cameras:

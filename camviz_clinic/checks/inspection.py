@@ -150,6 +150,8 @@ class Inspection:
         undecided = self.summary.undecided(name) if self.summary else ()
         told = {"distortion": distortion, "rms": rms} | ({"undecided": list(undecided)} if undecided else {})
         told |= {"stamp": stamp.known()} if stamp else {}
+        if delay := self.calibration.line_delays.get(name) if self.calibration else None:
+            told["line_delay"] = {"us": 1e6 * delay.seconds, "sigma_us": delay.sigma and 1e6 * delay.sigma}
         return {"name": name, "model": type(lens).__name__} | pinhole | told
 
     @cached_property

@@ -58,7 +58,10 @@ def pictured(
 def snapshot(
     camera: Camera, board: Board, cam_from_board: RigidTransform, rng: np.random.Generator, noise: float = 2.0
 ) -> NDArray[np.uint8]:
-    """The board at a pose, uint8 grey (height, width), a little out of focus, with noise of this σ in grey levels."""
+    """The board at a pose, uint8 grey (height, width), a little out of focus, with noise of this σ in grey levels.
+
+    With one pose for each row, each row is read at its own, as a rolling shutter does it.
+    """
     across, down = _seen(camera, board, cam_from_board)
     paper = (BLACK + (WHITE - BLACK) * whiteness(board, TEXELS, MARGIN)).astype(np.float32)
     samples = cv2.remap(paper, across, down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=BEHIND)
@@ -72,15 +75,19 @@ def _seen(camera: Camera, board: Board, cam_from_board: RigidTransform) -> tuple
     """The column and the row of the paper that each sample sees, float32 (FINER * height, FINER * width) each."""
     texel = board.square_size / TEXELS
     left, top = (edge - MARGIN * board.square_size for edge in board.area[:2])
-    board_from_cam = cam_from_board.inv().as_matrix()[:3] / texel  # in texels
-    x, y, z = np.tensordot(board_from_cam[:, :3].astype(np.float32), _rays(camera), axes=1)
-    start = board_from_cam[:, 3].astype(np.float32)
+    board_from_cam = (cam_from_board.inv().as_matrix()[..., :3, :] / texel).astype(np.float32)  # in texels
+    turn, start = board_from_cam[..., :3], board_from_cam[..., 3]
+    if turn.ndim == 2:
+        x, y, z = np.tensordot(turn, _rays(camera), axes=1)
+    else:
+        x, y, z = np.einsum("rij,jrc->irc", turn.repeat(FINER, axis=0), _rays(camera))
+        start = start.repeat(FINER, axis=0).T[..., None]
     with np.errstate(divide="ignore", invalid="ignore"):
         along = -start[2] / z
     behind = ~(along > 0)
     for at, first, edge in ((x, start[0], left), (y, start[1], top)):
         at *= along
-        at += np.float32(first - edge / texel - 0.5)
+        at += np.asarray(first - edge / texel - 0.5, np.float32)
         at[behind] = -1e6
     return x, y
 

@@ -150,6 +150,9 @@ class Summary:
             sigma = inf if key in self.undecided(name) else self.evidence.sigma_of(name, key)
             if sigma is not None or value or key in ("cx", "cy"):
                 yield key, measured(value, sigma)
+        if delay := self.calibration.line_delays.get(name):
+            sigma = None if delay.sigma is None else 1e6 * delay.sigma
+            yield "line delay", f"{measured(1e6 * delay.seconds, sigma)} µs"
         yield from self.bend.items()
 
     def undecided(self, name: str) -> tuple[str, ...]:

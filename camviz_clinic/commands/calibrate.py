@@ -42,6 +42,7 @@ from camviz_clinic.commands.rig import (
     rig_of_pictures,
     usual_name,
 )
+from camviz_clinic.commands.rolling import ROLLING, add_rolling, calibrate_rolling, is_rolling
 from camviz_clinic.commands.telling import report, worth
 
 if TYPE_CHECKING:
@@ -71,6 +72,7 @@ EXAMPLES = """\
 examples:
   camviz calibrate left*.jpg --board 9x6 --square-mm 25 --report report.html
   camviz calibrate film.mp4 --frames 20 --board 9x6 --square-mm 25
+  camviz calibrate film.mp4 --rolling-shutter estimate --board 9x6 --square-mm 25
   camviz calibrate --corners corners.vnl --board 9x6 --square-mm 25 --size 640x480
   camviz calibrate --corners left.vnl --right right.vnl --board 9x6 --square-mm 25 --size 640x480
   camviz calibrate left/ --right right/ --board 9x6 --square-mm 25 -o stereo.yaml
@@ -96,7 +98,7 @@ def add(commands: Any) -> None:
         "calibrate",
         calibrate,
         "calibrate a camera, a pair or a rig from pictures or films",
-        f"{CALIBRATE}\n{FILMS}\n{RIG}",
+        f"{CALIBRATE}\n{FILMS}\n{ROLLING}\n{RIG}",
     )
     models = "".join(f"  {name:11} {says}\n" for name, says in MODELS.items())
     command.epilog = f"models:\n{models}\n{EXAMPLES}\n{GATE}\n{STATUS}"
@@ -119,6 +121,7 @@ def add(commands: Any) -> None:
         help="solve for the board's bend, as mrcal's calobject_warp: where the views agree on it, always, or never "
         "(default: auto)",
     )
+    add_rolling(command)
     command.add_argument("--keep-outliers", action="store_true", help="set nothing aside")
     command.add_argument("--finder", choices=FINDERS, default="auto", help="how chessboards are found")
     command.add_argument("--workers", metavar="N", type=_count, help="processes (default: one for each processor)")
@@ -199,7 +202,7 @@ def _of_stills(options: argparse.Namespace, of_films: tuple[str, ...]) -> int:
         told(sentence)
     for sentence in worth(calibration, options.goal):
         told(sentence)
-    if doctored := "" if options.rig else _prescribed(shots, options, calibration):
+    if doctored := "" if options.rig or is_rolling(options) else _prescribed(shots, options, calibration):
         told(f"Is the board as described? {doctored}")
     told(f"{options.output}: written.{' ' * bool(left_out)}{' '.join(left_out)}")
     decides = gate.asked or options.junit is not None
@@ -325,6 +328,8 @@ def _single(paths: list[Path], board: Board, options: argparse.Namespace) -> Cal
     from camviz_clinic.calibration import calibrate
 
     detections = _looked(paths, board, options)
+    if is_rolling(options):
+        return _solved(lambda: calibrate_rolling(detections, board, options, _how(options)), detections.skipped)
     return _solved(lambda: calibrate(detections, board, options.model, **_how(options)), detections.skipped)
 
 

@@ -14,6 +14,7 @@ from camviz_clinic.commands.boards import board_of
 from camviz_clinic.commands.common import LACKING, Refusal, refuse_output
 from camviz_clinic.commands.pictures import PICTURES, Bar, pictures
 from camviz_clinic.commands.rig import held_of, models_of, told_apart
+from camviz_clinic.commands.rolling import film_in_bursts, is_rolling, refuse_no_film
 
 if TYPE_CHECKING:
     from camviz_clinic.films import Chosen
@@ -31,7 +32,10 @@ turned as a phone would show them: the camera is that of the sensor's own rows a
 
 def add_frames(command: argparse.ArgumentParser) -> None:
     command.add_argument(
-        "--frames", metavar="N", type=_frames, help="how many frames of films are used, for each camera (default: 30)"
+        "--frames",
+        metavar="N",
+        type=_frames,
+        help="how many frames of films are used, for each camera (default: 30, with --rolling-shutter 120)",
     )
 
 
@@ -48,11 +52,15 @@ def as_pictures(options: argparse.Namespace, how: Mapping[str, Any]) -> Iterator
     `how` is what `chosen_frames` is told of the model and the search. Raises Refusal for films that cannot be used.
     """
     if options.corners:
+        if is_rolling(options):
+            refuse_no_film(options, 0, 0)
         yield ()
         return
     given = {word: _found(getattr(options, word) or []) for word in ("images", "right", "rig")}
     paths = [path for several in given.values() for path in several]
     films = [path for path in paths if FILM.fullmatch(path.suffix)]
+    if is_rolling(options):
+        refuse_no_film(options, len(films), len(paths) - len(films))
     if options.frames and not films:
         raise Refusal("--frames is for films: pictures are all used.")
     if not films and not any(HEIC.fullmatch(path.suffix) for path in paths):
@@ -101,6 +109,9 @@ def _frames_of(
     given: dict[str, list[Path]], room: Path, options: argparse.Namespace, how: Mapping[str, Any]
 ) -> tuple[str, ...]:
     """Puts the chosen frames of films in their place; what is to be said of the films."""
+    if is_rolling(options):
+        given["images"], said = film_in_bursts(given["images"][0], room, options)
+        return said
     if given["rig"]:
         cameras = _by_name(given["rig"])
         lenses = {"model": models_of(cameras, options), "held": held_of(cameras, options)}

@@ -8,6 +8,7 @@ from typing import Any
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady, KannalaBrandt, Perspective, UnifiedSphere
+from camviz_clinic.calibration.line_delay import LineDelay
 from camviz_clinic.calibration.stamp import LONGEST, Stamp
 from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format, listed
@@ -54,7 +55,9 @@ def read(file: File) -> Calibration:
     grid = _used(profile, solved)
     camera = _camera(profile, held, grid)
     notes = (*_centre(solved, grid), *_recording(profile), *_rows(profile), *_limits(profile, held))
-    return Calibration({"camera": camera}, file.path, TITLE, notes=notes, stamps={"camera": _stamp(profile)})
+    stamps, delay = {"camera": _stamp(profile)}, _line_delay(profile, grid.height)
+    delays = {} if delay is None else {"camera": delay}
+    return Calibration({"camera": camera}, file.path, TITLE, notes=notes, stamps=stamps, line_delays=delays)
 
 
 def _refuse_digital_lens(profile: Section) -> None:
@@ -159,6 +162,16 @@ def _rows(profile: Section) -> list[str]:
     return [said] if time else []
 
 
+def _line_delay(profile: Section, height: int) -> LineDelay | None:
+    """From one row of calib_dimension to the next; None where that is not said, and where columns are read."""
+    time = profile.number("frame_readout_time") if "frame_readout_time" in profile else 0.0
+    word = profile.values.get("frame_readout_direction")
+    if not time or word in ("LeftToRight", "RightToLeft"):
+        return None
+    upwards = word == "BottomToTop" if isinstance(word, str) else time < 0
+    return LineDelay((-1 if upwards else 1) * abs(time) / 1000 / height)
+
+
 def _limits(profile: Section, held: Section) -> list[str]:
     notes = []
     limit = held.number("radial_distortion_limit") if "radial_distortion_limit" in held else 0.0
@@ -223,6 +236,8 @@ def write(calibration: Calibration) -> bytes:
             "distortion_coeffs": values or [0.0] * 4,
         },
     }
+    if delay := calibration.line_delays.get(name):
+        tree["frame_readout_time"] = delay.of_rows(camera.intrinsics.height)[0]
     return as_json(tree)
 
 
@@ -254,7 +269,7 @@ FORMAT = Format(
     most_cameras=1,
     models=f"{listed(MODELS)}; poly3 and poly5 are read too",
     says="for pictures of calib_dimension; the principal point is the middle unless asymmetrical; four zeros are a "
-    "pinhole; read-out time, RMS and radial_distortion_limit are read as notes",
+    "pinhole; RMS and radial_distortion_limit are read as notes; the read-out time is a line delay",
     lacks="skew, tilt, an equidistant fisheye",
     rank=45,
 )

@@ -14,6 +14,7 @@ from camviz.lenses import BrownConrady, KannalaBrandt, Lens, UnifiedSphere
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.denominator_prior import DenominatorPrior
+from camviz_clinic.calibration.line_delay import LineDelay
 from camviz_clinic.calibration.stamp import LONGEST, Stamp
 from camviz_clinic.calibration.types import Board, Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format
@@ -29,7 +30,7 @@ ROTATION, TRANSLATION = "r|rotation|rotationmatrix", "t|translation|translationv
 PROJECTION = "p|projection(matrix)?"
 OF_A_PAIR = {"E": "e|essential(matrix)?", "F": "f|fundamental(matrix)?", "Q": "q|disparitytodepth(map|matrix)?"}
 EXTRINSICS, ERRORS, DETECTIONS = "extrinsicparameters", "perviewreprojectionerrors", "imagepoints"
-PICTURES, ASIDE = "picturenames", "setaside"
+PICTURES, ASIDE, LINE_DELAY = "picturenames", "setaside", "linedelay"
 ESTIMATED, COVARIANCE, PRIOR = "estimatedparameters", "intrinsicscovariance", "denominatorprior"
 
 STAMP = "stamp"
@@ -155,7 +156,7 @@ def _recorded(section: Section, tags: dict[str, str], notes: list[str]) -> dict[
     """All that a calibration holds beside its cameras, whose names have the tags of their keys."""
     by_name: dict[str, dict[str, Any]] = {}
     for name, tag in tags.items():
-        of_camera = _views(section, tag) | _solution(section, tag) | _stamp(section, tag)
+        of_camera = _views(section, tag) | _solution(section, tag) | _stamp(section, tag) | _line_delay(section, tag)
         for field, value in of_camera.items():
             by_name.setdefault(field, {})[name] = value
     skipped = words(section, "skipped_pictures")
@@ -275,6 +276,17 @@ def _stamp(section: Section, tag: str) -> dict[str, Any]:
             said = tuple(" ".join(word.split())[: 10 * LONGEST] for word in words(part, each.name))
             held[each.name] = said if each.name in SEVERAL else " ".join(said)
     return {"stamps": Stamp(**held)}
+
+
+def _line_delay(section: Section, tag: str) -> dict[str, Any]:
+    """How long a rolling shutter takes from row to row, in seconds, as `camviz calibrate` writes it."""
+    key, spread = _find(section, LINE_DELAY, tag), _find(section, f"{LINE_DELAY}sigma", tag)
+    if key is None:
+        return {}
+    sigma = None if spread is None else section.number(spread)
+    if sigma is not None and not sigma >= 0:
+        raise section.error(spread or key, "a standard deviation in seconds", f"{sigma:g}")
+    return {"line_delays": LineDelay(section.number(key), sigma)}
 
 
 def _mask(section: Section, key: str, detections: Any) -> Any:

@@ -109,6 +109,10 @@ def _views(calibration: Calibration, name: str, tag: str) -> dict[str, Any]:
         values["image_points"] = np.ascontiguousarray(calibration.detections[name])
     if name in calibration.set_aside:
         values["set_aside"] = np.ascontiguousarray(calibration.set_aside[name], dtype=np.uint8)
+    if delay := calibration.line_delays.get(name):
+        values["line_delay"] = delay.seconds
+        if delay.sigma is not None:
+            values["line_delay_sigma"] = delay.sigma
     if stamp := calibration.stamps.get(name, NO_STAMP).known():
         values["stamp"] = stamp
     return {f"{key}{tag}": value for key, value in values.items()}

@@ -30,6 +30,7 @@ BY_CAMERA = (
     "intrinsics_covariance",
     "priors",
     "stamps",
+    "line_delays",
 )
 
 
@@ -216,6 +217,7 @@ def _missing(calibration: Calibration, back: Calibration) -> list[str]:
         "board_warp": "the bend of the board",
         "skipped": "the pictures that were skipped",
         "stamps": "what it was made for and when",
+        "line_delays": "the line delay of the rolling shutter",
         "world_from_imu": "the place of the IMU",
     }
     lost = [said for field, said in kinds.items() if _held(calibration, field) and not _held(back, field)]

@@ -9,7 +9,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Slerp
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import RotationSpline, Slerp
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses.base import Array
@@ -19,6 +20,7 @@ from camviz_clinic.checks.snapshots import snapshot
 from camviz_clinic.checks.virtual import spread_boards
 
 TILT_DEG = (5, 35)
+ROUNDS = 6  # until a corner's row and its time agree: each lessens the error by the rows it moves in a row's time
 STILL = 1e-3  # of the board's length, moved while one frame is taken: no picture shows less
 
 
@@ -65,6 +67,21 @@ class Take:
         """What another camera, in place before this one's frame, films of it."""
         return replace(self, camera=camera.at(RigidTransform.identity()), stops=camera.cam_from_world * self.stops)
 
+    def corners(self, times: Array) -> Array:
+        """Where the corners are seen, pixels (frames, corners, 2), in frames whose middle rows are read at `times`.
+
+        Each corner is seen where it is when its own row is read. It is NaN outside of the picture.
+        """
+        grid, points = self.camera.intrinsics, self.board.corners
+        row_s = self.readout_s / grid.height
+        late = np.zeros((len(times), len(points)))
+        for _ in range(ROUNDS):
+            poses = self.at((times[:, None] + late).ravel())
+            seen = self.camera.project(poses.apply(np.tile(points, (len(times), 1)))).reshape(*late.shape, 2)
+            late = row_s * (np.nan_to_num(seen[..., 1]) - (grid.height - 1) / 2)
+        inside = np.all((seen >= 0) & (seen <= [grid.width - 1, grid.height - 1]), axis=-1, keepdims=True)
+        return np.where(inside, seen, np.nan)
+
     def pictures(self, rng: np.random.Generator, noise: float = 2.0, moments: int = 4) -> Iterator[NDArray[np.uint8]]:
         """The frames, uint8 grey (height, width), each of so many moments between its first row and its last."""
         for frame in range(self.frames):
@@ -84,6 +101,23 @@ class Take:
         share /= share.sum(axis=0)
         mean = np.einsum("mvu,mv->vu", seen, share.astype(np.float32))
         return np.clip(np.rint(mean + rng.normal(0, noise, mean.shape)), 0, 255).astype(np.uint8)
+
+
+class SmoothTake(Take):
+    """The same board carried without rest and without a jerk through all stops, as a hand on the move carries it."""
+
+    def at(self, time_s: Array) -> RigidTransform:
+        """cam_from_board at times (n,): splines through the stops, each passed in the middle of its rest."""
+        middle, passed = self.board.corners.mean(axis=0), (self.reach_s + self.leave_s) / 2
+        turn = RotationSpline(passed, self.stops.rotation)(time_s)
+        where = CubicSpline(passed, self.stops.apply(middle))(time_s)
+        return RigidTransform.from_components(where - turn.apply(middle), turn)
+
+    def _picture(self, time_s: float, rng: np.random.Generator, noise: float, moments: int) -> NDArray[np.uint8]:
+        """Sharp, each row at the pose of its own time; the middle row is read at `time_s`."""
+        height = self.camera.intrinsics.height
+        late = self.readout_s / height * (np.arange(height, dtype=np.float64) - (height - 1) / 2)
+        return snapshot(self.camera, self.board, self.at(np.asarray(time_s + late)), rng, noise)
 
 
 def take(

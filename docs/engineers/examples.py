@@ -24,7 +24,7 @@ from camviz_clinic.checks.rig import lone_poses
 from camviz_clinic.checks.snapshots import snapshot
 from camviz_clinic.checks.virtual import spread_boards
 from camviz_clinic.files.writing import write as write_calibration
-from camviz_clinic.films.virtual import take, write_film
+from camviz_clinic.films.virtual import SmoothTake, take, write_film
 from camviz_clinic.handeye.virtual import cell
 from camviz_clinic.rigs import virtual
 
@@ -87,6 +87,7 @@ def write(folder: Path) -> None:
     shoot(folder / "phone", LEFT, spread_boards(own, (LEFT,), SHEET, 10, (15, 40)), own, SHEET)
     robot(folder)
     film(folder / "film.avi")
+    rolling_film(folder / "rolling.avi")
 
 
 def shoot(
@@ -131,6 +132,13 @@ def film(path: Path) -> None:
     rng = np.random.default_rng(20)
     filmed = take(rng, FILMING, BOARD, 14, rest_s=0.2, way_s=0.4, rate=8.0)
     write_film(path, filmed, rng, noise=3.0)
+
+
+def rolling_film(path: Path) -> None:
+    """A second and a half of a board that never rests before a camera that reads its 240 rows in 25 ms."""
+    rng = np.random.default_rng(3)
+    stops = take(rng, FILMING, Board(5, 4, 0.045), 5, rest_s=0, way_s=0.45, window=0.7, readout_s=0.025)
+    write_film(path, SmoothTake(**vars(stops)), rng)
 
 
 def edge() -> np.ndarray:

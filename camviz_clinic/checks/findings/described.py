@@ -71,6 +71,8 @@ def interpolated(evidence: Evidence) -> Iterator[Finding]:
     """
     if evidence.shown is None:
         raise NotChecked(WITHOUT)
+    if evidence.calibration.line_delays:
+        raise NotChecked("the corners in the file are those of a shutter of all rows at once, not of the pictures")
     seen = replace(evidence.shown, calibration=evidence.calibration)
     if not evidence.once(("saddles",), lambda: smooth_errors(seen)):
         raise NotChecked("the pictures given are not those of the corners in the file")

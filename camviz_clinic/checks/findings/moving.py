@@ -104,7 +104,8 @@ def _squares_beside(residuals: Array, columns: Array, freedom: int) -> tuple[flo
     view="residual-vectors",
     symptom="The rows of the image were read one after the other while camera or board moved.",
     causes=("a rolling shutter while camera or board moved",),
-    remedy="Take the pictures again with camera and board still, or with a global shutter. Solve again.",
+    remedy="Take the pictures again with camera and board still, or with a global shutter. Solve again. "
+    "Of a film the shutter can be solved for as well (camviz calibrate FILM --rolling-shutter estimate).",
     threshold="The velocities explain at least 0.7 of the noise, by chance in one set of a million. "
     "Columns and both diagonals leave at least 3 % more of the squares than rows do.",
     explains=(
