@@ -147,9 +147,11 @@ class Inspection:
         pinhole = {key: getattr(grid, key) for key in ("width", "height", "fx", "fy", "cx", "cy")}
         distortion = {key: float(value) for key, value in asdict(lens).items()}
         stamp = self.calibration.stamps.get(name) if self.calibration else None
-        undecided = self.summary.undecided(name) if self.summary else ()
-        told = {"distortion": distortion, "rms": rms} | ({"undecided": list(undecided)} if undecided else {})
-        told |= {"stamp": stamp.known()} if stamp else {}
+        told: dict[str, object] = {"distortion": distortion, "rms": rms}
+        if undecided := self.summary.undecided(name) if self.summary else ():
+            told["undecided"] = list(undecided)
+        if stamp:
+            told["stamp"] = stamp.known()
         if delay := self.calibration.line_delays.get(name) if self.calibration else None:
             told["line_delay"] = {"us": 1e6 * delay.seconds, "sigma_us": delay.sigma and 1e6 * delay.sigma}
         return {"name": name, "model": type(lens).__name__} | pinhole | told
