@@ -81,8 +81,17 @@ def jupyter(front_end: str, folder: Path, home: Path, **environment: str) -> Ite
         wait_for(f"http://127.0.0.1:{port}/api", server, log)
         yield f"http://127.0.0.1:{port}/{place}/{{path}}?token={token}&reset"
     finally:
-        server.terminate()
-        server.wait(timeout=300)
+        _end(server)
+
+
+def _end(server: subprocess.Popen[bytes]) -> None:
+    """Ask a server to stop. One that has stopped but for a thread of anyio's, as happens now and then, is killed."""
+    server.terminate()
+    try:
+        server.wait(timeout=60)
+    except subprocess.TimeoutExpired:
+        server.kill()
+        server.wait()
 
 
 jupyterlab = partial(jupyter, "JupyterLab")

@@ -136,8 +136,11 @@ def tangential_as_given(xy, p1, p2):
 
 
 def _tangential_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    for shape in SHAPES:
-        yield (rng.uniform(-0.8, 0.8, (*shape, 2)), *rng.uniform(-0.1, 0.1, 2).tolist())
+    """Each coefficient with either sign; the last point on an axis, where nothing makes up for the square's sign."""
+    for shape, signs in zip(SHAPES, ((1, 1), (-1, 1), (1, -1), (-1, -1)), strict=True):
+        yield (rng.uniform(-0.8, 0.8, (*shape, 2)), *(rng.uniform(0.02, 0.1, 2) * signs).tolist())
+    for sign in (1, -1):
+        yield (np.array([rng.uniform(0.3, 0.8), 0.0]), *(sign * rng.uniform(0.02, 0.1, 2)).tolist())
 
 
 TANGENTIAL = Exercise(

@@ -171,12 +171,26 @@ def _H(K: Array, R: Array, t: Array) -> Array:
     return K @ np.column_stack([R[:, 0], R[:, 1], t])
 
 
+def _pose_with_a_near_right(rng: np.random.Generator) -> tuple[Array, Array]:
+    """The same, the board's right side nearer than its left: its first column has numbers of both signs."""
+    R, t = _pose(rng)
+    while R[2, 0] >= 0:
+        R, t = _pose(rng)
+    return R, t
+
+
+def _turned(R: Array, quarters: int) -> Array:
+    """The pose of the board turned by quarters in its own plane."""
+    return np.asarray(R @ Rotation.from_rotvec([0, 0, quarters * np.pi / 2]).as_matrix())
+
+
 def _focal_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    """Boards turned by quarters, H of either sign, and a principal point beyond the picture's upper left corner."""
-    for quarters in range(4):
-        K, (R, t) = _K(rng), _pose(rng)
-        R = R @ Rotation.from_rotvec([0, 0, quarters * np.pi / 2]).as_matrix()
-        yield float(rng.uniform(0.2, 5)) * (-1) ** quarters * _H(K, R, t), K[:2, 2]
+    """One board turned by quarters, so that each of its columns has either sign and either is the longer in depth, and
+    others; H of either sign, and a principal point beyond the picture's upper left corner."""
+    first = _pose(rng)
+    for place, (upright, t) in enumerate((first, first, first, first, _pose(rng), _pose(rng))):
+        K, R = _K(rng), _turned(upright, place)
+        yield float(rng.uniform(0.2, 5)) * (-1) ** place * _H(K, R, t), K[:2, 2]
     K = _K(rng) * [[1, 1, -1], [1, 1, -1], [1, 1, 1]]
     yield _H(K, *_pose(rng)), K[:2, 2]
 
@@ -324,8 +338,14 @@ def _what_they_say(rows: Array) -> Array:
 
 
 def _constraint_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    for _ in range(4):
-        yield (_H(_K(rng), *_pose(rng)),)
+    """One board turned by quarters, so that each of its columns has either sign, and one with both signs in its first,
+    and then in its second column."""
+    upright, t = _pose(rng)
+    for quarters in range(4):
+        yield (_H(_K(rng), _turned(upright, quarters), t),)
+    R, t = _pose_with_a_near_right(rng)
+    for quarters in range(2):
+        yield (_H(_K(rng), _turned(R, quarters), t),)
 
 
 CONSTRAINTS = Exercise(
@@ -460,15 +480,14 @@ def _nearest_rotation(M: Array) -> Array:
 
 
 def _pose_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    """H times positive and negative numbers, of boards that are upright, and of boards held on their heads."""
-    sides = ((1, 1), (-1, -1), (1, -1), (-1, 1))
-    for (sign, turn), side in zip(((1, 0.0), (-1, 0.0), (1, np.pi), (-1, np.pi)), sides, strict=True):
-        K, (R, t) = _K(rng), _pose(rng)
-        t = t * [*side, 1]
-        R = R @ Rotation.from_rotvec([0, 0, turn]).as_matrix()
+    """H times positive and negative numbers, of two boards that are upright, and then held on their heads."""
+    sides, boards = ((1, 1), (-1, -1), (1, -1), (-1, 1)), (_pose(rng), _pose(rng))
+    for place, ((sign, quarters), side) in enumerate(zip(((1, 0), (-1, 0), (1, 2), (-1, 2)), sides, strict=True)):
+        K, (R, t) = _K(rng), boards[place % 2]
+        R, t = _turned(R, quarters), t * [*side, 1]
         yield sign * float(rng.choice([rng.uniform(0.2, 0.8), rng.uniform(1.3, 5)])) * _H(K, R, t), K
     K = _K(rng) * [[1, 1, -1], [1, 1, -1], [1, 1, 1]]  # the principal point beyond the upper left corner
-    yield _H(K, *_pose(rng)), K
+    yield _H(K, *_pose_with_a_near_right(rng)), K
 
 
 def _a_rotation(function: Function, rng: np.random.Generator) -> str:

@@ -296,8 +296,12 @@ def right_epipole(F: Array) -> Array:
 
 
 def _epipole_cases(rng: np.random.Generator) -> Iterator[Arguments]:
-    for _ in range(12):  # a singular vector has either sign
-        yield (_F(rng),)
+    """Four pairs at least, and as many as it takes until a singular vector of either sign was among them."""
+    signs: list[float] = []
+    while len(signs) < 4 or len({*signs}) < 2:
+        F = _F(rng)
+        signs.append(np.sign(np.linalg.svd(F)[0][2, 2]))
+        yield (F,)
 
 
 EPIPOLE = Exercise(

@@ -281,6 +281,7 @@ def robust_sigma(residuals: Array) -> float:
 
 def _sigma_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     yield (_residuals(rng, 60),)
+    yield (rng.normal(0, 20, (61, 2)),)  # so large that a per cent is seen
     for shape in ((8, 54), (3, 6, 9)):
         wild = _unseen(rng, _residuals(rng, *shape))
         wild[0] += rng.uniform(5, 30, 2)
@@ -765,6 +766,24 @@ def _view_choices(rng: np.random.Generator) -> Iterator[Arguments]:
                 if next_view(known, candidates, parameter) not in answers and answers[3] != answers[5]:
                     break
             yield known, candidates, parameter
+    yield from _choices_by_signs(rng)
+
+
+def _choices_by_signs(rng: np.random.Generator) -> Iterator[Arguments]:
+    """Among which one chooses another view who drops the signs of what the views say together, or of either part."""
+    signs = (
+        lambda known, candidates: np.abs(known + candidates),
+        lambda known, candidates: np.maximum(known + candidates, 0),
+        lambda known, candidates: np.maximum(known, 0) + candidates,
+        lambda known, candidates: known + np.maximum(candidates, 0),
+    )
+    for dropped in signs:
+        right = wrong = 0
+        while right == wrong:
+            known, candidates = _information(rng, 4, 5), np.array([_information(rng, 4, 5) for _ in range(6)])
+            right = next_view(known, candidates, 1)
+            wrong = np.argmin(np.linalg.inv(dropped(known, candidates))[:, 1, 1])
+        yield known, candidates, 1
 
 
 def without_the_known(known, candidates, parameter):
