@@ -699,6 +699,7 @@ def _edge_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     steep[:2] += 2 * np.arange(5)  # brighter from left to right: the column is the better way
     steep[2:] += 2 * np.arange(5)[:, None]  # brighter from above to below: the row is
     yield (steep,)
+    yield (steep - 20,)  # below zero, as after the black level is taken off
     peaked = rng.uniform(0, 0.1, (4, 5, 5))  # along the row only the bend tells, along the column only the slope does
     peaked[:, 2, :] = (0, 0.5, 1, 0.5, 0)
     peaked[:, :, 2] = (1, 0.4, 1, 0.6, 1)
