@@ -15,7 +15,8 @@ def document(title: str, body: str, *, layout: str = "", script: str = "") -> st
     code = f"<script>{script}</script>" if script else ""
     return (
         f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{name} · camviz</title>'
-        f'<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f'<meta name="description" content="{name}: a camera calibration, looked at by camviz.">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" href="data:,">'
         f"<style>{page_style()}{_layout()}{layout}</style></head><body><main><h1>{name}</h1>{body}</main>"
         f"<footer>Made by camviz {__version__}. Pixels count from the centre of the first one; metres; "
         f"x right, y down, z forward.</footer>{code}</body></html>\n"

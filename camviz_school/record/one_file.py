@@ -55,7 +55,7 @@ def _module(pane: RecordedPane) -> str:
 def _page(pane: RecordedPane) -> str:
     return (
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{escape(pane.title)}</title>'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" href="data:,">'
         "<style>:root { color-scheme: light dark } body { margin: 4px; font-family: system-ui, sans-serif }</style>"
         f"</head><body><main>{pane.html_within()}</main><script>{_scripts(pane)}</script></body></html>\n"
     )
