@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from math import inf
 from multiprocessing.connection import Connection, wait
 from os import PathLike
@@ -89,6 +89,21 @@ class Detections:
             object.__setattr__(self, "places", tuple(range(len(self.pictures))))
         if len(self.places) != len(self.pictures):
             raise ValueError(f"places must be {len(self.pictures)} indices, as there are pictures, got {self.places}")
+
+    def only(self, views: Iterable[int]) -> Detections:
+        """Some of the views, with their places.
+
+        Args:
+            views: Their numbers, in the order wanted.
+
+        Returns: Detections of these.
+
+        >>> Detections(("a.png", "b.png"), np.zeros((2, 1, 2)), 640, 480).only([1]).places
+        (1,)
+        """
+        kept = list(views)
+        names, places = tuple(self.pictures[view] for view in kept), tuple(self.places[view] for view in kept)
+        return replace(self, pictures=names, corners=self.corners[kept], places=places)
 
 
 def detect(

@@ -127,7 +127,7 @@ def calibrate_pair(
         raise CannotCalibrate(
             f"at least {FEWEST_VIEWS} views in which both cameras see the board are needed, there are {len(places)}"
         )
-    shared = {name: _only(detections, places) for name, detections in both.items()}
+    shared = {name: each.only(map(each.places.index, places)) for name, each in both.items()}
     alone = {name: _alone(name, shared[name], board, kind, estimated, robust) for name in both}
     pair = _paired(alone, board, estimated if joint else (), robust)
     pair = _robust(pair) if robust else _settled(pair)
@@ -300,12 +300,6 @@ def _refuse_too_few(adjustment: Adjustment, aside: Masks) -> None:
                 f"the views contradict each other: only {left} of {len(mask)} of the camera {name} would agree on one "
                 "camera; see that the board is the one named and lies still, and that zoom and focus are locked"
             )
-
-
-def _only(detections: Detections, places: Sequence[int]) -> Detections:
-    rows = [detections.places.index(place) for place in places]
-    names = tuple(detections.pictures[row] for row in rows)
-    return replace(detections, pictures=names, corners=detections.corners[rows], places=tuple(places))
 
 
 def _calibration(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -89,13 +88,7 @@ def calibrate_rolling(
     from camviz_clinic.calibration.rolling_solving import NotByRows, with_rolling_shutter
     from camviz_clinic.rigs.start import MOST_ALONE, varied
 
-    few = varied(detections.corners, MOST_ALONE)
-    some = replace(
-        detections,
-        pictures=tuple(detections.pictures[view] for view in few),
-        corners=detections.corners[few],
-        places=tuple(detections.places[view] for view in few),
-    )
+    some = detections.only(varied(detections.corners, MOST_ALONE))
     start = calibrate(some, board, options.model, fixed=how["fixed"], robust=False)
     times = np.array([options.times[picture] for picture in detections.pictures])
     held = None if options.rolling_shutter == ESTIMATE else float(options.rolling_shutter)

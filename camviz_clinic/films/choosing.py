@@ -108,13 +108,7 @@ def _solved(
     if len(found) > 1:
         return rig_of(calibrate_rig(found, board, model, held=held, fixed=fixed))
     ((name, seen_by),) = found.items()
-    views = varied(seen_by.corners, MOST_ALONE)
-    some = replace(
-        seen_by,
-        pictures=tuple(seen_by.pictures[view] for view in views),
-        corners=seen_by.corners[views],
-        places=tuple(seen_by.places[view] for view in views),
-    )
+    some = seen_by.only(varied(seen_by.corners, MOST_ALONE))
     solved = Adjustment.of(calibrate(some, board, model if isinstance(model, str) else model[name], fixed=fixed))
     ((name, camera),) = solved.cameras.items()
     poses, known = board_poses(camera, board, seen_by.corners)

@@ -37,7 +37,7 @@ def alone(
         camera, estimated, priors = Camera(held.intrinsics, held.lens), _NOTHING, {}
     else:
         few = varied(corners, MOST_ALONE)
-        solved = calibrate(_only(detections, few), board, model, fixed=fixed, robust=robust)
+        solved = calibrate(detections.only(few), board, model, fixed=fixed, robust=robust)
         camera, estimated, priors = solved.cameras["camera"], solved.estimated["camera"], dict(solved.priors)
     poses, known = board_poses(camera, board, corners)
     unknown = np.repeat(~known[:, None], corners.shape[1], axis=1)
@@ -137,9 +137,3 @@ def _frames(cameras: Mapping[str, Camera], by_camera: Mapping[str, Adjustment], 
         errors.append(np.where(each.posed, total, np.inf))
     best = np.argmin(errors, axis=0)
     return RigidTransform.concatenate([proposals[camera][frame] for frame, camera in enumerate(best)])
-
-
-def _only(detections: Detections, rows: Indices) -> Detections:
-    names = tuple(detections.pictures[row] for row in rows)
-    places = tuple(detections.places[row] for row in rows)
-    return replace(detections, pictures=names, corners=detections.corners[rows], places=places)

@@ -87,8 +87,8 @@ class Recorder:
             return
         spawn = multiprocessing.get_context("spawn")  # a fresh interpreter each: a lesson leaves nothing to the next
         workers = min(len(stale), os.cpu_count() or 1)
-        end = end_with_parent
-        with ProcessPoolExecutor(workers, mp_context=spawn, max_tasks_per_child=1, initializer=end) as pool:
+        fresh = {"mp_context": spawn, "max_tasks_per_child": 1, "initializer": end_with_parent}
+        with ProcessPoolExecutor(workers, **fresh) as pool:
             jobs = {pool.submit(record_cells, self, name, cells): name for name, cells in stale.items()}
             for job in as_completed(jobs):
                 said = job.exception() or job.result()
