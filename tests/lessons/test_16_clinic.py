@@ -654,3 +654,141 @@ def test_hand_and_eye(says):
         np.testing.assert_allclose(t.ravel(), X.translation, atol=0.005)
     (release,) = says("OpenCV has this as `calibrateHandEye` in its releases 4.")
     assert release.value == 4
+
+
+def cells():
+    """The cells of the lesson by their names."""
+    from quoting import LESSONS
+
+    from camviz_school.course import notebooks
+
+    return {one.id: one.source for one in notebooks.read(LESSONS / "16_clinic.ipynb").cells}
+
+
+def run_here(names, *identifiers):
+    """What these cells of the lesson leave behind, on top of `names`."""
+    for identifier in identifiers:
+        exec(cells()[identifier], names)
+    return names
+
+
+def test_which_frames_of_a_film(says):
+    """By OpenCV's error bars of the views alone, from their corners."""
+    from camviz_school.course.material import module
+
+    says("Equal spacing needs about sixty for it")
+    (pictures,) = says("A film of ten seconds holds 300 pictures, and most of them show the same.")
+    (foretold,) = says("Six chosen frames bring the foretold σ to 1.0 px.")
+    made = ANNA.experiment
+    bend = np.array([getattr(made.camera.lens, name) for name in ("k1", "k2", "p1", "p2")])
+    board, K = made.solved.board.corners, made.camera.intrinsics.K
+    names = {"np": np, "cv2": cv2, "board": board, "believed": (K, bend), "next_view": module("16").next_view}
+    names["attempt"] = lambda function, *arguments, like: function(*arguments)
+    exec("def information" + cells()["information"].split("def information")[1].split("def tilted")[0], names)
+    exec(cells()["film-choice"].split("plt.semilogy")[0], names)
+
+    def sigma(frames):
+        """OpenCV's σ of fx of these frames, for a noise of 0.14 px."""
+        rng, seen = np.random.default_rng(1), []
+        for frame in frames:
+            uv = cv2.projectPoints(board, names["turns"][frame], names["shifts"][frame], K, bend)[0]
+            seen.append(np.float32(uv[:, 0] + rng.normal(0, 0.14, (54, 2))))
+        flags = cv2.CALIB_FIX_K3 | cv2.CALIB_USE_INTRINSIC_GUESS
+        flat = [np.float32(board)] * len(seen)
+        start = K.copy(), np.append(bend, 0)
+        rms, *_, sigmas, _, _ = cv2.calibrateCameraExtended(flat, seen, (640, 480), *start, flags=flags)
+        return 0.14 / rms * np.sqrt(2) * sigmas[0, 0]
+
+    yours = sigma(names["chosen"][:6])
+    assert yours == pytest.approx(foretold.value, abs=0.1)
+    assert sigma(names["equal"][59]) == pytest.approx(yours, rel=0.1)
+    assert sigma(names["equal"][29]) > 1.2 * yours
+    assert len(names["frames"]) == pictures.value
+
+
+def test_a_film_whose_rows_wait(says):
+    """The delay by trying which one OpenCV fits best; where corners are found, by a root for each corner."""
+    from scipy.optimize import brentq, minimize_scalar
+
+    from camviz_school.course.material import module
+
+    middle, rows = says("Row v is read (v − 240) d after the middle one of 480")
+    assert 2 * middle.value == rows
+    (again,) = says("A corner that moves at w px/s is therefore found off its place by d · (v − 240) w.")
+    assert again.value == middle
+    (unit,) = says("Call q how far that is at a delay of 1 µs")
+    frames, delay, whole = says("Here 24 frames are taken of a board in motion. The delay is 50 µs, which makes 24 ms")
+    right, fx, before, rms, noise = says(
+        "The right delay comes out as 49.5 µs. With it fx is 523.0 px in place of 534.3, and the error of the fit "
+        "falls from 0.23 px to the noise, 0.14 px."
+    )[:5]
+    made = ANNA.experiment
+    names = {"np": np, "cv2": cv2, "board": made.solved.board.corners, "Rotation": Rotation}
+    run_here(names, "rows-film", "rows-derivative", "rows-fit")
+    seen, q, e, J = (names[name] for name in ("seen", "q", "e", "J"))
+    assert len(seen) == frames.value
+    assert 480 * delay.value * 1e-3 == whole
+    np.testing.assert_allclose(q, unit.value * 1e-6 * (seen[..., 1:] - middle.value) * names["w"])
+
+    def late(i):
+        """How many rows after the middle one a corner of the first frame is read, by a root."""
+
+        def miss(rows):
+            t = rows * delay.value * 1e-6
+            turn = np.array([0.35 * np.sin(2.1 * t + 0.3), 0.4 * np.sin(1.7 * t + 1), 0.3 * np.sin(1.3 * t)])
+            shift = np.array([0.1 * np.sin(3 * t), 0.07 * np.sin(2.3 * t), 0.55 + 0.08 * np.sin(1.9 * t + 2)])
+            xyz = Rotation.from_rotvec(turn).apply(names["middled"][i]) + shift
+            uv = cv2.projectPoints(xyz, np.zeros(3), np.zeros(3), names["K_true"], names["lens_true"])[0].ravel()
+            return uv[1] - 240 - rows
+
+        return brentq(miss, -240, 240, xtol=1e-9)
+
+    rolled = names["film"](np.array([0.0]))[0]
+    np.testing.assert_allclose(rolled[[0, 20, 53], 1] - 240, [late(i) for i in (0, 20, 53)], atol=1e-6)
+
+    def error(d):
+        return names["fit"](seen - d * q)[0][0]
+
+    best = minimize_scalar(error, bounds=(40, 60), method="bounded", options={"xatol": 0.05}).x
+    yours = module("16").line_delay(e, J, q.ravel())
+    assert yours == right
+    assert yours == pytest.approx(best, abs=1.0)  # to first order, and to the end
+    assert np.sum(q.ravel() * e) / np.sum(q**2) < delay.value / 10
+    says("The slope finds less than a tenth of the delay.")
+    mended, global_shutter = names["fit"](seen - yours * q)[0], names["found"]
+    assert (mended[1][0, 0], mended[0]) == (fx, noise)
+    assert (global_shutter[1][0, 0], global_shutter[0]) == (before, rms)
+    assert 0.1 * np.sqrt(2) == noise  # of both coordinates
+
+
+def test_islands_and_a_ring(says):
+    """The clinic's own islands; errors of a chain by first order, from each link's lever arm."""
+    from camviz.poses import RigidTransform
+    from camviz_clinic.rigs.graph import islands
+    from camviz_school.course.material import module
+
+    says("Six cameras look into a room from all sides")
+    says("There are three islands: cam0, cam1 and cam2; cam3 and cam4; cam5 alone.")
+    names = run_here({"np": np}, "rig-seen")
+    saw = names["saw"]
+    assert islands(dict(zip(names["TABLE"], saw, strict=True))) == [
+        ("cam0", "cam1", "cam2"),
+        ("cam3", "cam4"),
+        ("cam5",),
+    ]
+    assert module("16").islands(saw).tolist() == [0, 0, 0, 3, 3, 5]
+    assert saw.shape == (6, 12)
+    assert not (saw[0] & saw[2]).any()
+    tied = np.column_stack([saw, np.isin(range(6), (2, 3)), np.isin(range(6), (4, 5))])
+    assert module("16").islands(tied).tolist() == [0] * 6
+    turn, shift = says("with a pose that is off by 0.05° about each axis and by 0.5 mm along each")
+    closed, chained, worst = says("cam5 is off by 0.9 mm in place of 5.3 mm, and no camera by more than 2.3 mm")
+    says("cam5 is off six times as far as cam1")
+    chord = 2 * 1200 * np.abs(np.sin(np.radians(60) * np.arange(6) / 2))  # from a camera to the one so many places on
+    variance = [3 * n * shift.value**2 + 2 * np.radians(turn.value) ** 2 * np.sum(chord[:n] ** 2) for n in range(1, 6)]
+    off = np.sqrt(variance)
+    ring = 1 / np.sqrt(1 / off**2 + 1 / off[::-1] ** 2)
+    assert (ring[-1], off[-1], ring.max()) == (closed, chained, worst)
+    assert 5.5 < off[-1] / off[0] < 6.5
+    names = run_here({"np": np, "RigidTransform": RigidTransform, "Rotation": Rotation}, "rig-chain")
+    np.testing.assert_allclose(names["off"], off, rtol=0.02)

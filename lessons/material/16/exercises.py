@@ -6,6 +6,7 @@ Residuals are observed less projected, in pixels, (views, corners, 2) or (rows, 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -1012,7 +1013,235 @@ def stretch_kept(rays_first, rays_second):
     return rays_second.T @ rays_first / len(rays_first)
 
 
-# 8: other numbers, the same pictures ----------------------------------------------------------------------------------
+# 8: the delay of a row ------------------------------------------------------------------------------------------------
+
+
+def line_delay(e: Array, J: Array, q: Array) -> float:
+    """The d of e = J x + d q by least squares, with x free; e and q are (n,), J (n, k)."""
+    return float(np.linalg.lstsq(np.column_stack([J, q]), e)[0][-1])
+
+
+def _delay_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    """A delay of either sign, a part of which the poses hide; e has noise, so no few rows give it."""
+    for n, k, sign in ((40, 3, 1), (60, 6, -1), (120, 14, 1), (30, 1, -1)):
+        J = rng.normal(0, 1, (n, k)) * 10 ** rng.uniform(-0.5, 2, k)
+        hidden = J @ rng.normal(0, 1, k)
+        q = 0.02 * (rng.normal(0, 1, n) + hidden / np.std(hidden))
+        yield J @ rng.normal(0, 0.3, k) + sign * rng.uniform(10, 100) * q + rng.normal(0, 0.2, n), J, q
+
+
+DELAY = Exercise(
+    name="16.line_delay",
+    reference=line_delay,
+    cases=_delay_cases,
+    hints=(
+        "Write e = J x + d q as one product: a matrix times the unknowns. The unknowns are x, and d below it.",
+        "The matrix is J with one more column. `np.column_stack([A, b])` puts b beside A, and "
+        "`np.linalg.lstsq(A, e)[0]` solves by least squares.",
+        "`return np.linalg.lstsq(np.column_stack([___, ___]), e)[0][___]`",
+    ),
+    praise="One more column, and the poses no longer hide the delay.",
+    tolerance=1e-6,
+)
+
+
+@DELAY.right
+def what_is_left_of_q(e, J, q):
+    free = q - J @ np.linalg.lstsq(J, q)[0]  # Frisch and Waugh (1933)
+    return free @ e / (free @ free)
+
+
+@DELAY.right
+def by_normal_equations(e, J, q):
+    scale = np.linalg.norm(q)
+    A = np.column_stack([q / scale, J])
+    return np.linalg.solve(A.T @ A, A.T @ e)[0] / scale
+
+
+@DELAY.right
+def by_the_qr_factors(e, J, q):
+    Q, R = np.linalg.qr(np.column_stack([J, q]))
+    return (Q.T @ e)[-1] / R[-1, -1]
+
+
+@DELAY.wrong("This is the slope of e over q alone. The poses have moved to hide the delay: give them J's columns too.")
+def slope_alone(e, J, q):
+    return q @ e / (q @ q)
+
+
+@DELAY.wrong("You take from e what J explains, and leave q as it is. The poses take up a part of q as well.")
+def only_e_freed(e, J, q):
+    return q @ (e - J @ np.linalg.lstsq(J, e)[0]) / (q @ q)
+
+
+@DELAY.wrong("This is how q follows from e. The noise is in e: d is wanted of e = J x + d q.")
+def the_other_way(e, J, q):
+    return np.linalg.lstsq(np.column_stack([J, e]), q)[0][-1]
+
+
+@DELAY.wrong("This is one of the x, not d: the unknowns stand in the order of the columns.")
+def first_unknown(e, J, q):
+    return np.linalg.lstsq(np.column_stack([J, q]), e)[0][0]
+
+
+@DELAY.wrong("The sign is wrong: e is what was observed less what was projected, and d q is a part of e.")
+def sign_of_the_delay(e, J, q):
+    return -line_delay(e, J, q)
+
+
+@DELAY.wrong("These are all unknowns. Return the last one, d.")
+def all_unknowns(e, J, q):
+    return np.linalg.lstsq(np.column_stack([J, q]), e)[0]
+
+
+@DELAY.wrong("This is how large e is beside q. A slope asks whether they go together, and has a sign.")
+def ratio_of_sizes(e, J, q):
+    return np.std(e) / np.std(q)
+
+
+@DELAY.wrong("This is the slope of a straight line with a constant beside it. Give the fit J's columns, not a one.")
+def line_with_a_constant(e, J, q):
+    return np.polyfit(q, e, 1)[0]
+
+
+# 9: islands ----------------------------------------------------------------------------------------------------------
+
+
+def islands(seen: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """The number (n,) of the first camera to which each is tied, by which of n cameras sees the board in m frames."""
+    first = np.arange(len(seen))
+    for frame in seen.T:
+        first[np.isin(first, first[frame])] = min(first[frame], default=0)
+    return first
+
+
+def _rig_cases(rng: np.random.Generator) -> Iterator[Arguments]:
+    """Rigs whose ties run over cameras in between, in any order, with cameras alone and frames that nobody sees."""
+    yield (_tied([(0, 3), (3, 1), (1, 2)], 4),)  # a chain whose middle is not in order
+    yield (_tied([(2, 4), (1, 3), (3, 4)], 6),)  # 0 and 5 alone
+    yield (_tied([(0, 1), (2, 3), (0, 2), (4, 5)], 6),)  # two pairs become one island by a later frame
+    yield (np.eye(4, dtype=bool),)  # each by itself
+    for n in (5, 7, 9):
+        order = rng.permutation(n)
+        split = int(rng.integers(2, n - 2))
+        chains = [*pairwise(order[:split]), *pairwise(order[split:-1])]  # the last one stays alone
+        rng.shuffle(chains)
+        yield (_tied([(int(a), int(b)) for a, b in chains], n),)
+    yield (_tied([(1, 2, 4)], 5),)  # three cameras see one frame
+
+
+def _tied(frames: list[tuple[int, ...]], cameras: int) -> NDArray[np.bool_]:
+    """(cameras, frames + 2): who sees which frame; then one that nobody sees, and one that only the last one sees."""
+    seen = np.zeros((cameras, len(frames) + 2), dtype=bool)
+    for frame, names in enumerate(frames):
+        seen[list(names), frame] = True
+    seen[-1, -1] = True
+    return seen
+
+
+ISLANDS = Exercise(
+    name="16.islands",
+    reference=islands,
+    cases=_rig_cases,
+    hints=(
+        "Begin with n islands: each camera is the first of its own. A frame joins the islands of all who see it.",
+        "Keep an array `first`, at the start each camera's own number. For a `frame` of `seen.T`, `first[frame]` are "
+        "the islands that it joins. "
+        "*Every* camera of these islands gets the smallest of their numbers, whether it sees this frame or not.",
+        "`first[np.isin(first, first[frame])] = ___`, if `frame.any()`",
+    ),
+    praise="Cameras of different islands have no pose to each other, however good each calibration is.",
+)
+
+
+@ISLANDS.right
+def by_walking(seen):
+    first = -np.ones(len(seen), dtype=int)
+    for start in range(len(seen)):
+        waiting = [start] if first[start] < 0 else []
+        while waiting:
+            one = waiting.pop()
+            first[one] = start
+            waiting += [k for k in range(len(seen)) if first[k] < 0 and (seen[one] & seen[k]).any()]
+    return first
+
+
+@ISLANDS.right
+def by_powers_of_the_graph(seen):
+    tied = seen.astype(int) @ seen.T + np.eye(len(seen), dtype=int) > 0
+    return np.argmax(np.linalg.matrix_power(tied.astype(float), len(seen)) > 0, axis=1)
+
+
+@ISLANDS.right
+def by_scipy_s_components(seen):
+    from scipy.sparse.csgraph import connected_components
+
+    label = connected_components(seen.astype(int) @ seen.T > 0)[1]
+    return [int(np.flatnonzero(label == one)[0]) for one in label]
+
+
+@ISLANDS.right
+def until_nothing_changes(seen):
+    first = list(range(len(seen)))
+    changed = True
+    while changed:
+        changed = False
+        for i in range(len(seen)):
+            for k in range(len(seen)):
+                if (seen[i] & seen[k]).any() and first[k] < first[i]:
+                    first[i], changed = first[k], True
+    return first
+
+
+@ISLANDS.wrong("You look at pairs. Two cameras that share no frame may still be tied by a third one, or by a chain.")
+def pairs_alone(seen):
+    tied = seen.astype(int) @ seen.T + np.eye(len(seen), dtype=int) > 0
+    return np.argmax(tied, axis=1)
+
+
+@ISLANDS.wrong(
+    "A frame joins whole islands. You change those who see this frame, and leave the others of their islands behind."
+)
+def only_who_sees_it(seen):
+    first = np.arange(len(seen))
+    for frame in seen.T:
+        first[frame] = min(first[frame], default=0)
+    return first
+
+
+@ISLANDS.wrong("You number the islands one after another. Give each camera the number of its island's first camera.")
+def islands_counted(seen):
+    return np.unique(islands(seen), return_inverse=True)[1]
+
+
+@ISLANDS.wrong("This is the last camera of each island. Give the first one.")
+def last_of_them(seen):
+    return len(seen) - 1 - islands(seen[::-1])[::-1]
+
+
+@ISLANDS.wrong("This says for each camera how many cameras it is tied to, not to which island it belongs.")
+def how_many(seen):
+    first = islands(seen)
+    return np.sum(first[:, None] == first, axis=1)
+
+
+@ISLANDS.wrong("A camera that shares no frame is an island by itself: its number is its own.")
+def alone_is_minus_one(seen):
+    first = islands(seen)
+    return np.where(np.sum(first[:, None] == first, axis=1) == 1, -1, first)
+
+
+@ISLANDS.wrong("This is the first frame that each camera sees. Give the first camera that it is tied to.")
+def first_frame(seen):
+    return np.argmax(seen, axis=1)
+
+
+@ISLANDS.wrong("This is right only where all are tied together.")
+def all_together(seen):
+    return np.zeros(len(seen), dtype=int)
+
+
+# 10: other numbers, the same pictures ---------------------------------------------------------------------------------
 
 
 def same_pictures(R: Array, t: Array, Q: Array, d: Array, s: float) -> tuple[Array, Array]:
@@ -1118,4 +1347,4 @@ def unchanged(R, t, Q, d, s):
     return R, t
 
 
-EXERCISES = (VIEW_RMS, LINES, ROBUST_SIGMA, HUBER, TRIAGE, NEXT, ROTATION, GAUGE)
+EXERCISES = (VIEW_RMS, LINES, ROBUST_SIGMA, HUBER, TRIAGE, NEXT, ROTATION, DELAY, ISLANDS, GAUGE)
