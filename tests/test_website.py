@@ -92,6 +92,19 @@ def test_a_page_has_every_picture_of_its_notebook_with_its_words_as_a_file(pair)
             assert (made.site / "_pictures" / name).stat().st_size > 100
 
 
+def test_a_page_says_once_which_function_of_the_reader_a_picture_waits_for(pair) -> None:
+    lesson, page, _ = pair
+    for cell, shown in zip(code(lesson), code(page), strict=True):
+        printed = "".join(one.text for one in cell.outputs if one.output_type == "stream")
+        names = re.findall(r"`(\w+)` (?:returns nothing|is not written) yet", printed)
+        left = "".join(one.text for one in shown.outputs if one.output_type == "stream")
+        told = re.findall(r'class="camviz-awaited">(.*?)</p>', html_of(shown))
+        assert " yet, so its part of the picture stays empty" not in left
+        assert len(told) == bool(names)
+        assert re.findall(r"<code>(\w+)</code>", "".join(told)) == list(dict.fromkeys(names))
+        assert [line for line in printed.splitlines() if " yet, so " not in line] == left.splitlines()
+
+
 def grouped(*cells):
     """What `beside` makes, a group in brackets: "# a" is a heading, P a pane, ? a prediction, x an exercise."""
     kinds = {"P": "pane", "?": "asked", "x": "other"}

@@ -101,6 +101,18 @@ def test_axe_finds_no_fault_on_any_lesson_in_the_dark(page: Page, address: str) 
     assert {name: wrong for name, wrong in found.items() if wrong} == {}
 
 
+def test_a_still_has_no_frame_of_the_theme_in_the_dark(page: Page, address: str) -> None:
+    """The theme lays white paper with a margin under every picture of a notebook; stills bring their own ground."""
+    page.emulate_media(color_scheme="dark")
+    page.goto(f"{address}/{LESSON}.html")
+    framed = page.evaluate("""() => [...document.querySelectorAll(".bd-article img")].filter((one) => {
+      const style = getComputedStyle(one);
+      return style.backgroundColor !== "rgba(0, 0, 0, 0)" || style.padding !== "0px" || style.filter !== "none";
+    }).map((one) => one.alt)""")
+    assert framed == []
+    assert page.locator(".bd-article .cell_output img").count() > 5
+
+
 def test_a_button_can_be_called_by_the_words_on_it() -> None:
     """WCAG 2.5.3: who speaks to the computer says what can be read; its name for scripts must have these words."""
     for path in SITE.rglob("*.html"):

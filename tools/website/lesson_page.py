@@ -17,6 +17,7 @@ from beside import Kind, beside
 from links import REPOSITORY, on_site
 
 from camviz.draw import prose
+from camviz.views.yours import is_unwritten
 from camviz_school.course import colab
 from camviz_school.course.exercises import exercise
 from camviz_school.course.notebooks import Cell, Notebook, exercise_of, read
@@ -74,7 +75,8 @@ class LessonPage:
 
     def _output(self, cell: Cell, number: int) -> None:
         asked = asked_by(cell.source)
-        for output in cell.get("outputs", []):
+        cell.outputs = [kept for output in cell.get("outputs", []) for kept in _said(output)]
+        for output in cell.outputs:
             data = output.get("data", {})
             if "text/html" not in data:
                 continue
@@ -105,6 +107,18 @@ def _is_folded(cell: Cell, moves: bool) -> bool:
 def _has_figure(cell: Cell) -> bool:
     """Recordings of an earlier notebook have other numbers, and must not be taken for panes of this one."""
     return any("<figure" in output.get("data", {}).get("text/html", "") for output in cell.get("outputs", []))
+
+
+def _said(output: Cell) -> list[Cell]:
+    """An output, in which what a notebook says of unwritten functions is one sentence for who reads a page."""
+    lines = output.text.splitlines(keepends=True) if output.output_type == "stream" else []
+    names = dict.fromkeys(re.findall(r"`\w+`", "".join(filter(is_unwritten, lines))))
+    if not names:
+        return [output]
+    output.text = "".join(line for line in lines if not is_unwritten(line))
+    sentence = f"A part of this picture waits for {' and '.join(names)}, which you write in a notebook."
+    waits = _html_output(f'<p class="camviz-awaited">{prose.inline(sentence)}</p>')
+    return [output, waits] if output.text.strip() else [waits]
 
 
 def _kind(cell: Cell) -> Kind:
