@@ -179,6 +179,22 @@ def test_positions_are_thinned_until_the_size_holds(tmp_path):
     assert (heights[0], heights[-1]) == (0, 1)
 
 
+@dataclass(frozen=True)
+class Heavy(Toy):
+    """A view that has the most in common between its positions, and it cannot be compressed."""
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        common = np.random.default_rng(17).bytes(20_000).hex()
+        drawn = f"<path d='{common}'/><circle r='{self.height:g}'/>"
+        return Picture.whole(drawn, 10, 10, "Heavy", f"height {self.height:g}")
+
+
+def test_what_all_positions_have_in_common_takes_no_position_away(tmp_path):
+    whole = record(explore(Heavy(), "height"), tmp_path)
+    made = record(explore(Heavy(), "height"), tmp_path, budget=Budget(size=int(1.6 * whole.size)))
+    assert made.counts["height"] == whole.counts["height"] == 41
+
+
 def test_positions_are_thinned_to_their_number_and_the_fewest_are_always_made(tmp_path):
     whole = record(explore(Toy()), tmp_path)
     made = record(explore(Toy()), tmp_path, budget=Budget(positions=whole.positions - 1))

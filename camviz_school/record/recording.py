@@ -198,18 +198,27 @@ class _Recorder:
         self._says = ""
 
     def recording(self) -> RecordedPane:
-        """The finest of SHARES that holds the budget."""
+        """The finest of SHARES that holds the budget, as far as the coarser ones foretell it."""
         kept = self._within(SHARES[-1])
         if kept is None:
             raise BudgetError(self._says)
+        while finer := self._finer(kept):
+            kept = finer
+        return self._written(kept)
+
+    def _finer(self, kept: RecordedPane) -> RecordedPane | None:
+        """The finest recording that should hold the budget by the size of `kept`, and does; None where none is finer.
+
+        What a pane takes whatever its positions counts with each of them, so that few positions foretell too much.
+        """
         for share in SHARES[:-1]:
             states = len(self._states(self._sheets(share)))
             more = states / kept.positions
             if more > 1 and kept.size * more <= self._budget.size and states <= self._budget.positions:
                 finer = self._within(share)
                 if finer:
-                    return self._written(finer)
-        return self._written(kept)
+                    return finer
+        return None
 
     def _within(self, share: float) -> RecordedPane | None:
         """The recording with that share of the positions; None where it breaks the budget, which `_says` why."""
