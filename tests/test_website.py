@@ -2,6 +2,7 @@
 
 import inspect
 import json
+import os
 import re
 import subprocess
 import sys
@@ -138,6 +139,24 @@ def test_a_report_of_the_gallery_has_its_picture_and_no_other_page_changes():
     assert re.sub(r"<img [^>]*><br> ", "", shown) == page
     other = (ROOT / "docs/engineers/symptoms.md").read_text(encoding="utf-8")
     assert engineers.with_pictures(other) == other
+
+
+def test_reports_are_made_anew_when_what_makes_them_has_changed(tmp_path: Path) -> None:
+    script, clinic = tmp_path / "docs/engineers/gallery.py", tmp_path / "camviz_clinic/report/page.py"
+    for path in (script, clinic):
+        path.parent.mkdir(parents=True)
+    clinic.touch()
+    script.write_text(
+        "import sys, pathlib; f = pathlib.Path(sys.argv[1]); f.mkdir(parents=True, exist_ok=True)\n"
+        "(f / 'a.html').write_text(str(len([*f.glob('a.html')])))",
+        encoding="utf-8",
+    )
+    made = tmp_path / "site" / engineers.REPORTS / "a.html"
+    for changed, said in ((None, "0"), (None, "0"), (clinic, "1")):
+        if changed:
+            os.utime(changed, (made.stat().st_mtime + 10,) * 2)
+        engineers.write_reports(tmp_path, tmp_path / "site")
+        assert made.read_text(encoding="utf-8") == said
 
 
 def test_every_lesson_stands_on_the_map_once(tmp_path: Path):

@@ -78,7 +78,8 @@ def picture(patient: Patient, inspection: Inspection) -> str:
     shown = VIEWS[ALIASES.get(name, name)].view(Case(calibration), camera).figure()
     boards = [tile for tile in shown.tiles if tile.name == "the board"]
     narrow = [tile for tile in shown.tiles if tile.cell[2] <= NARROW]
-    return shown.document((boards + narrow + list(shown.tiles))[0])
+    tile = (boards + narrow + list(shown.tiles))[0]
+    return shown.document(tile).replace("--shown:100vw", "--shown:calc(1px * var(--w))")  # its words shrink with it
 
 
 PATIENTS = (
@@ -121,7 +122,7 @@ def page() -> str:
 
 
 def _link(finding: str | None) -> str:
-    return f"[`{finding}`](../clinic.md#{finding})" if finding else "none"
+    return f"[`{finding}`](../clinic.md#{finding})" if finding else "no finding"
 
 
 def write(folder: Path) -> None:
