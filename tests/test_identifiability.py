@@ -16,7 +16,9 @@ from camviz_clinic.checks.findings import kinds
 from camviz_clinic.checks.summary import Summary
 from camviz_clinic.checks.virtual import detections, healthy, healthy_pair, single
 from camviz_clinic.commands.telling import report
+from camviz_clinic.live.session import Session, TakenView
 from camviz_clinic.report.findings import glance_html
+from camviz_clinic.views.correlation import CorrelationView
 
 NAMES = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 NOISE = 0.2
@@ -193,3 +195,24 @@ def test_check_withholds_the_deviation_of_what_new_views_do_not_decide():
     assert any("(± not known)" in fact for fact in judgement.facts)
     assert any("do not decide fx" in fact for fact in judgement.facts)
     assert judgement.numbers["parameters"]["fx"]["sigma"] is None
+
+
+def test_the_correlations_show_no_deviation_of_what_the_corners_do_not_decide():
+    shown = CorrelationView.of(injected("parallel boards", 3.0).calibration)
+    assert shown.deviations()["fx"] == shown.deviations()["fy"] == "not known"
+    assert shown.deviations()["cx"].startswith("±")
+    assert "fx not known; fy not known; cx ±" in shown.description()
+    assert ">not known<" in shown.figure().svg()
+    sound = CorrelationView.of(healthy(np.random.default_rng(18)))
+    assert "not known" not in sound.deviations().values()
+
+
+@pytest.mark.parametrize(("tilt_deg", "known"), [(1, False), (40, True)])
+def test_a_live_session_gives_fx_a_deviation_only_where_the_corners_decide_it(tilt_deg, known, monkeypatch):
+    set_up = single(np.random.default_rng(5), tilt_deg=(0, tilt_deg))
+    seen = set_up.observed(np.random.default_rng(6))[0]
+    session = Session(set_up.board)
+    gray = np.zeros((set_up.camera.intrinsics.height, set_up.camera.intrinsics.width), np.uint8)
+    session.views = tuple(TakenView(gray, corners) for corners in seen[:-1])
+    monkeypatch.setattr("camviz_clinic.live.session.find_corners", lambda gray, board: seen[-1])
+    assert np.isfinite(session._solved(gray).known.sigma) == known

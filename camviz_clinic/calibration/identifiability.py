@@ -81,6 +81,11 @@ def undecided(adjustment: Adjustment, name: str, noise: float) -> tuple[Undecide
     )
 
 
+def undecided_names(adjustment: Adjustment, name: str) -> set[str]:
+    """Those of camera `name`'s estimated intrinsics that are part of such a combination, by the fit's own noise."""
+    return {key for each in undecided(adjustment, name, adjustment.sigma) for key in each.changes}
+
+
 def _combination(
     data: Adjustment,
     name: str,

@@ -152,14 +152,16 @@ function tell(root, { sentence, known, views, coverage, done }) {
   const say = root.querySelector(".sentence");
   if (say.textContent !== sentence) say.textContent = sentence;
   const [, fx, sigma, largest] = known.at(-1) ?? [];
-  const focal = fx === undefined ? "fx not known yet" : `fx = ${fx.toFixed(1)} ± ${sigma.toPrecision(2)} px`;
+  const focal = fx === undefined ? "fx not known yet" : `fx = ${fx.toFixed(1)} px ± ${sigma === null ? "not known" : sigma.toPrecision(2)}`;
   const worst = largest ? ` · largest expected error ${largest.toPrecision(2)} px` : "";
   root.querySelector(".numbers").textContent = `${views} views · ${Math.round(100 * coverage)} % covered · ${focal}${worst}`;
   if (known.length && root.dataset.plotted !== String(known.length)) plot(root.querySelector("svg"), known);
   Object.assign(root.dataset, { plotted: known.length, views, done });
 }
 
-function plot(svg, known) {
+function plot(svg, all) {
+  const known = all.filter(([, , sigma]) => sigma !== null);
+  if (!known.length) return;
   const logs = known.map(([, , sigma]) => Math.log10(Math.max(sigma, 1e-3)));
   const top = Math.ceil(Math.max(...logs)), bottom = Math.min(Math.floor(Math.min(...logs)), top - 1);
   const x = (i) => 40 + (i * 190) / Math.max(known.length - 1, 1), y = (log) => 12 + ((top - log) * 62) / (top - bottom);

@@ -18,6 +18,7 @@ from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.boards import kind_of
 from camviz_clinic.calibration.detection import CannotCalibrate, Detections
 from camviz_clinic.calibration.finding import find_corners
+from camviz_clinic.calibration.identifiability import undecided_names
 from camviz_clinic.calibration.solving import MODELS, calibrate
 from camviz_clinic.calibration.stamp import Stamp, now
 from camviz_clinic.calibration.types import Board, Calibration
@@ -45,7 +46,10 @@ class TakenView:
 
 @dataclass(frozen=True)
 class Known:
-    """How well the camera was known after so many views: fx and its σ in pixels, and the largest expected error."""
+    """How well the camera was known after so many views: fx and its σ in pixels, and the largest expected error.
+
+    σ is infinite where the corners do not decide fx.
+    """
 
     views: int
     fx: float
@@ -284,6 +288,7 @@ class Session:
             why = str(error) if len(views) > 2 else ""
             return _Step(views[-1], guide=first_guide(self.board, width, height, len(views)), why=why)
         sigma = float(np.sqrt(solved.intrinsics_covariance["camera"][0, 0]))
+        sigma = np.inf if "fx" in undecided_names(adjustment, "camera") else sigma
         known = Known(len(views), solved.cameras["camera"].intrinsics.fx, sigma, next_guide.largest)
         return _Step(views[-1], self._stamped(solved), next_guide, known)
 

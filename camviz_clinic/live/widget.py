@@ -139,7 +139,7 @@ class CaptureWidget(StillWidget):
             "squares": board.kind in ("chessboard", "charuco"),
             "covered": [_rounded(view.corners[rim]) for view in session.views],
             "coverage": session.coverage,
-            "known": [[each.views, each.fx, each.sigma, _finite(each.largest)] for each in session.known],
+            "known": [[each.views, each.fx, _finite(each.sigma), _finite(each.largest)] for each in session.known],
             "taken": answer.taken,
             "views": len(session.views),
             "sentence": answer.sentence,

@@ -17,6 +17,7 @@ from camviz.draw.readout import signed
 from camviz.draw.shades import Shades, bar
 from camviz.lenses.base import Array
 from camviz.views.base import View, choice
+from camviz_clinic.calibration.identifiability import undecided_names
 from camviz_clinic.views.observations import Missing
 from camviz_clinic.views.uncertainty import adjusted, determined
 
@@ -31,6 +32,7 @@ class CorrelationView(View):
     """The correlations (n, n) of a solution's parameters, from their covariance, with each one's standard deviation.
 
     Two that hang together by almost ±1 can be traded for one another: the corners cannot tell which of them it is.
+    Parameters that the corners do not decide (`undecided`) have no standard deviation.
     """
 
     title: ClassVar[str] = "What the solution cannot tell apart"
@@ -38,6 +40,7 @@ class CorrelationView(View):
     names: tuple[str, ...]
     covariance: Array = field(compare=False, repr=False)
     values: Array | None = field(default=None, compare=False, repr=False)
+    undecided: frozenset[str] = frozenset()
     show: str = choice("correlation", "size only", label="show", help="with its sign, or how strong it is")
 
     def __post_init__(self) -> None:
@@ -68,8 +71,9 @@ class CorrelationView(View):
         by_corners = adjustment.corner_covariance
         times = np.sqrt(np.diag(adjustment.covariance) / np.diag(by_corners))
         alone = len(adjustment.cameras) == 1
-        shown = tuple(name.split(".", 1)[1] if alone else name for name in names)
-        return cls(shown, by_corners * np.outer(times, times))
+        lacking = {f"{name}.{key}" for name in adjustment.cameras for key in undecided_names(adjustment, name)}
+        shown, undecided = ([name.split(".", 1)[1] if alone else name for name in each] for each in (names, lacking))
+        return cls(tuple(shown), by_corners * np.outer(times, times), undecided=frozenset(undecided))
 
     @cached_property
     def correlations(self) -> Array:
@@ -84,11 +88,14 @@ class CorrelationView(View):
         order = np.argsort(-np.abs(np.nan_to_num(self.correlations[i, j])))
         return [(self.names[i[k]], self.names[j[k]], float(self.correlations[i[k], j[k]])) for k in order]
 
+    def deviations(self) -> dict[str, str]:
+        """Each parameter's standard deviation in words."""
+        sigmas = zip(self.names, np.sqrt(np.diag(self.covariance)), strict=True)
+        return {name: "not known" if name in self.undecided else f"±{sigma:.3g}" for name, sigma in sigmas}
+
     def description(self) -> str:
         told = "; ".join(f"{a} with {b} {signed(r, 2)}" for a, b, r in self.strongest()[:6])
-        deviations = "; ".join(
-            f"{name} ±{d:.3g}" for name, d in zip(self.names, np.sqrt(np.diag(self.covariance)), strict=True)
-        )
+        deviations = "; ".join(f"{name} {said}" for name, said in self.deviations().items())
         return (
             f"Correlations of {len(self.names)} parameters. The strongest: {told}. Standard deviations: {deviations}."
         )
@@ -135,11 +142,9 @@ class CorrelationView(View):
             words += svg.text((x, 72 + 20 * i), signed(r, 2), "number" + (" red" if abs(r) > _STRONG else ""))
             words += svg.text((x + 50, 72 + 20 * i), f"{a} – {b}", "label")
         words += svg.text((x, 280), "One standard deviation", "title")
-        rows = list(zip(self.names, np.sqrt(np.diag(self.covariance)), strict=True))
-        for i, (name, deviation) in enumerate(rows[:12]):
-            words += svg.text((x, 302 + 17 * i), name, "note") + svg.text(
-                (x + 140, 302 + 17 * i), f"±{deviation:.3g}", "number"
-            )
+        rows = list(self.deviations().items())
+        for i, (name, said) in enumerate(rows[:12]):
+            words += svg.text((x, 302 + 17 * i), name, "note") + svg.text((x + 140, 302 + 17 * i), said, "number")
         if len(rows) > 12:
             words += svg.text((x, 302 + 17 * 12), f"and {len(rows) - 12} more", "note")
         advice = (
