@@ -10,7 +10,7 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration import Board, Detections, calibrate, chessboards, find_corners
-from camviz_clinic.calibration.boards import kinds
+from camviz_clinic.calibration.boards import kinds, markers
 from camviz_clinic.calibration.boards.picture import whiteness
 from camviz_clinic.calibration.chessboards import everywhere
 from camviz_clinic.calibration.circle_grids import bias
@@ -21,6 +21,7 @@ from camviz_clinic.commands.command import main
 from camviz_clinic.files import Calibration, CalibrationError, load, write
 from camviz_clinic.files.target import read_target
 from camviz_clinic.meshes import board as mesh
+from camviz_clinic.rigs.start import board_poses
 from camviz_clinic.views.chessboard import outline, printed
 
 CAMERA = Camera(Intrinsics.from_fov(480, 360, 60), BrownConrady(-0.2, 0.05))
@@ -30,6 +31,7 @@ BOARDS = {
     "aprilgrid": Board.aprilgrid(4, 3, 0.04, 0.3),
     "circles": Board(7, 5, 0.03, kind="circles"),
     "asymmetric-circles": Board(4, 9, 0.02, kind="asymmetric-circles"),
+    "markers": Board.marker_grid(4, 3, 0.04, "DICT_4X4_50"),
 }
 POSE = RigidTransform.from_components([-0.09, -0.05, 0.36], Rotation.from_rotvec([0.35, -0.3, 0.1]))
 
@@ -115,6 +117,49 @@ def test_a_calibration_from_photographs_of_an_aprilgrid_finds_the_camera():
     truth = CAMERA.intrinsics
     assert solved.fx == pytest.approx(truth.fx, rel=2e-3)
     assert (solved.cx, solved.cy) == pytest.approx((truth.cx, truth.cy), abs=0.5)
+
+
+def test_a_marker_s_corner_is_not_where_opencv_ends_in_light_that_is_encoded():
+    """Blur and sRGB draw OpenCV's corners half a pixel and more towards the middle, by each of its ways."""
+    board = BOARDS["markers"]
+    picture, truth = (
+        photographed(CAMERA, board, POSE),
+        CAMERA.project(POSE.apply(board.corners)).reshape(-1, 2, 4, 2, 2),
+    )
+    for way in ("NONE", "SUBPIX", "CONTOUR"):
+        parameters = cv2.aruco.DetectorParameters()
+        parameters.cornerRefinementMethod = getattr(cv2.aruco, f"CORNER_REFINE_{way}")
+        detector = cv2.aruco.ArucoDetector(markers.marker_dictionary("DICT_4X4_50"), parameters)
+        found = {int(number): four[0] for four, number in zip(*detector.detectMarkers(picture)[:2], strict=True)}
+        corners = np.array([found[number][[0, 1, 3, 2]] for number in range(12)]).reshape(3, 4, 2, 2, 2)
+        off = np.linalg.norm(corners - truth.transpose(0, 2, 1, 3, 4), axis=-1)
+        assert np.median(off) > 0.5
+    assert np.median(np.linalg.norm(find_corners(picture, board).reshape(truth.shape) - truth, axis=-1)) < 0.025
+
+
+@pytest.mark.parametrize(("first_id", "border_bits"), [(0, 1), (7, 2)])
+def test_one_marker_gives_the_camera_s_place(first_id, border_bits):
+    board = Board.marker_grid(1, 1, 0.16, "DICT_5X5_100", first_id=first_id, border_bits=border_bits)
+    pose = RigidTransform.from_components([-0.08, -0.07, 0.45], Rotation.from_rotvec([0.5, -0.4, 0.3]))
+    picture = photographed(CAMERA, board, pose)
+    found = find_corners(picture, board)
+    assert found.shape == (4, 2)
+    assert np.nanmax(np.linalg.norm(found - CAMERA.project(pose.apply(board.corners)), axis=1)) < 0.1
+    poses, known = board_poses(CAMERA, board, found[None])
+    assert known.all()
+    assert np.linalg.norm(poses[0].inv().translation - pose.inv().translation) < 0.003  # of half a metre
+    other = Board.marker_grid(1, 1, 0.16, "DICT_5X5_100", first_id=first_id + 1, border_bits=border_bits)
+    assert find_corners(picture, other) is None
+
+
+def test_a_marker_whose_side_is_at_the_picture_s_border_is_left_out():
+    board = BOARDS["markers"]
+    picture, whole = photographed(CAMERA, board, POSE), CAMERA.project(POSE.apply(board.corners)).reshape(6, 8, 2)
+    border = int(whole[:, 3, 0].max()) + 2  # a pixel of white beside the second column
+    found = find_corners(np.ascontiguousarray(picture[:, :border]), board).reshape(6, 8, 2)
+    assert np.isfinite(found[:, :2]).all()
+    assert np.isnan(found[:, 2:4]).all(axis=(1, 2)).any()
+    assert np.nanmax(np.linalg.norm(found - whole, axis=-1)) < 0.1
 
 
 def test_the_middle_of_a_tilted_circle_is_not_where_its_centre_is_seen():

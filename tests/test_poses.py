@@ -54,6 +54,19 @@ def test_corners_with_noise_give_poses_within_3_sigmas_in_99_percent_and_the_sig
     assert np.sqrt(np.mean(off**2, axis=0)) == pytest.approx(np.ones(6), abs=3 * scatter)
 
 
+def test_one_marker_gives_poses_within_3_sigmas_and_none_of_its_four_corners_is_set_aside():
+    marker, rng, off = Board.marker_grid(1, 1, 0.1, "DICT_4X4_50"), np.random.default_rng(0), []
+    for _ in range(4):
+        truth = spread_boards(rng, (CAMERA,), marker, 40, (10, 45))
+        found = find_poses(CAMERA, marker, seen(truth, rng, 0.1, board=marker))
+        assert set(found.corners) == {4}
+        off.append(in_sigmas(found, truth))
+    assert sum(map(len, off)) >= 0.95 * 160  # few look alike from two places
+    off = np.concatenate(off)
+    assert (np.abs(off) < 3).mean() >= 0.99
+    assert 0.85 < np.sqrt(np.mean(off**2)) < 1.1  # a view that scatters more by chance has a larger ±
+
+
 def rendered(board, seed, views, noise):
     rng = np.random.default_rng(seed)
     truth = spread_boards(rng, (CAMERA,), board, views, (15, 40))

@@ -47,7 +47,7 @@ class Board:
     """A board: its points by columns and rows, and the distance of two of them.
 
     A chessboard's points are its inner corners. The markers of a ChArUco board lie in its white squares. An AprilGrid
-    is made by `aprilgrid`; a grid of circles has its circles' centres as points.
+    is made by `aprilgrid`, a grid of markers by `marker_grid`; a grid of circles has its circles' centres as points.
 
     Args:
         columns, rows: Number of points along a row and along a column.
@@ -58,8 +58,8 @@ class Board:
         kind: A name in `camviz_clinic.calibration.boards.kinds()`; a chessboard unless given, or a ChArUco board with a
             dictionary.
         legacy: A ChArUco board laid out as OpenCV before 4.6 did it, white first where the squares' rows are even.
-        first_id: Number of a ChArUco board's first marker.
-        border_bits: Border of a ChArUco board's markers, in cells.
+        first_id: Number of the first marker of a ChArUco board or a grid of markers.
+        border_bits: Border of these markers, in cells.
 
     Raises: ValueError for fewer than one point, a length that is not positive, or what no board of its kind can have.
 
@@ -88,10 +88,14 @@ class Board:
         if not self.kind:
             plain = self.marker_size is None and self.dictionary is None
             object.__setattr__(self, "kind", "chessboard" if plain else "charuco")
-        if self.kind != "charuco" and (self.legacy, self.first_id, self.border_bits) != (False, 0, 1):
+        may = {
+            "charuco": (self.legacy, self.first_id, self.border_bits),
+            "markers": (False, self.first_id, self.border_bits),
+        }
+        if (self.legacy, self.first_id, self.border_bits) != may.get(self.kind, (False, 0, 1)):
             raise ValueError(
-                "legacy, first_id and border_bits must be left out of all boards but a ChArUco board, got "
-                f"{self.legacy}, {self.first_id} and {self.border_bits}"
+                "legacy, first_id and border_bits must be left out of all boards but a ChArUco board, and legacy of a "
+                f"grid of markers, got {self.legacy}, {self.first_id} and {self.border_bits}"
             )
         kind_of(self).check(self)
 
@@ -110,6 +114,37 @@ class Board:
         (144, 3)
         """
         return cls(2 * columns, 2 * rows, tag_size * (1 + spacing), tag_size, FAMILY, "aprilgrid")
+
+    @classmethod
+    def marker_grid(
+        cls,
+        columns: int,
+        rows: int,
+        marker_size: float,
+        dictionary: str,
+        spacing: float = 0.3,
+        *,
+        first_id: int = 0,
+        border_bits: int = 1,
+    ) -> Self:
+        """A grid of ArUco markers without anything between them, or one marker alone.
+
+        Args:
+            columns, rows: Number of markers.
+            marker_size: Side of a marker in metres.
+            dictionary: By OpenCV's name, such as "DICT_4X4_50".
+            spacing: Gap between two markers as a share of `marker_size`.
+            first_id: Number of the marker at the upper left; the others follow row by row.
+            border_bits: Border of the markers, in cells.
+
+        Returns: Board with two points a marker along each side.
+
+        >>> Board.marker_grid(1, 1, 0.06, "DICT_4X4_50", first_id=7).corners.shape
+        (4, 3)
+        """
+        pitch = marker_size * (1 + spacing)
+        sizes = 2 * columns, 2 * rows, pitch, marker_size, dictionary, "markers"
+        return cls(*sizes, first_id=first_id, border_bits=border_bits)
 
     @property
     def corners(self) -> Array:

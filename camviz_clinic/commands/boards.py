@@ -24,10 +24,10 @@ def numbers_or_file(text: str) -> tuple[int, int] | Path:
     if text.lower().endswith(TARGET):
         return Path(text)
     match = re.fullmatch(r"([0-9]{1,3})\s*[xX×*,]\s*([0-9]{1,3})", text.strip())
-    if not match or not (2 <= int(match[1]) <= 200 and 2 <= int(match[2]) <= 200):
+    if not match or not (1 <= int(match[1]) <= 200 and 1 <= int(match[2]) <= 200):
         raise argparse.ArgumentTypeError(
-            "expected inner corners as COLUMNSxROWS, such as 9x6, from 2 to 200 (or tags, or circles), or Kalibr's "
-            f"target.yaml, got {text!r}"
+            "expected inner corners as COLUMNSxROWS, such as 9x6, at most 200 (or tags, markers or circles), or "
+            f"Kalibr's target.yaml, got {text!r}"
         )
     return int(match[1]), int(match[2])
 
@@ -41,19 +41,22 @@ def add_board(command: argparse.ArgumentParser, required: bool = True, default: 
         type=numbers_or_file,
         required=required,
         default=(9, 6) if default else None,
-        help="inner corners, where four squares meet, by columns and rows; or tags, or circles; or Kalibr's target.yaml"
-        + corners,
+        help="inner corners, where four squares meet, by columns and rows; or tags, markers or circles; or Kalibr's "
+        "target.yaml" + corners,
     )
     command.add_argument(
         "--square-mm",
         metavar="MM",
         type=millimetres,
         default=SIDE_MM if default and not required else None,
-        help="the side of a square, or of an AprilGrid's tag; of circles the distance of two centres" + side,
+        help="the side of a square, of a tag or of a marker; of circles the distance of two centres" + side,
     )
     command.add_argument("--kind", choices=list(kinds()), help="of the board (default: chessboard, or by its options)")
     command.add_argument(
         "--charuco", metavar="DICT", help="a ChArUco board with markers of this dictionary, such as 5X5_100"
+    )
+    command.add_argument(
+        "--markers", metavar="DICT", help="a grid of markers of this dictionary, or one alone (--board 1x1)"
     )
     command.add_argument(
         "--marker-mm", metavar="MM", type=millimetres, help="the side of a marker (default: 3/4), a circle's diameter"
@@ -62,18 +65,18 @@ def add_board(command: argparse.ArgumentParser, required: bool = True, default: 
         "--spacing",
         metavar="RATIO",
         type=bounded("a ratio", 0.01, 0.99),
-        help=f"between an AprilGrid's tags, in their side (default: {SPACING})",
+        help=f"between tags or markers, in their side (default: {SPACING})",
     )
     _add_markers(command)
 
 
 def _add_markers(command: argparse.ArgumentParser) -> None:
-    """How the markers of a ChArUco board are printed."""
+    """How the markers of a board are printed."""
     command.add_argument(
         "--legacy", action="store_true", help="a ChArUco board laid out as OpenCV before 4.6 did it (even rows)"
     )
     command.add_argument(
-        "--first-id", metavar="N", type=_number, default=0, help="of a ChArUco board's markers (default: 0)"
+        "--first-id", metavar="N", type=_number, default=0, help="the number of the first marker (default: 0)"
     )
     command.add_argument(
         "--border-bits",
@@ -81,7 +84,7 @@ def _add_markers(command: argparse.ArgumentParser) -> None:
         type=int,
         choices=(1, 2),
         default=1,
-        help="cells of the black border of a ChArUco board's markers: 1 (default), or 2 as Kalibr has it",
+        help="cells of a marker's black border: 1 (default), or 2 as Kalibr has it",
     )
 
 
@@ -120,7 +123,16 @@ def given_board(options: argparse.Namespace) -> Board | None:
 def _of_file(options: argparse.Namespace) -> Board:
     from camviz_clinic.files.target import read_target
 
-    if any((options.kind, options.charuco, options.marker_mm, options.spacing, _printed(options) != AS_OPENCV)):
+    if any(
+        (
+            options.kind,
+            options.charuco,
+            options.markers,
+            options.marker_mm,
+            options.spacing,
+            _printed(options) != AS_OPENCV,
+        )
+    ):
         raise Refusal(f"{options.board}: the file says which board it is: leave --kind and the board's sizes out.")
     return read_target(options.board)
 
@@ -131,21 +143,45 @@ def _board(options: argparse.Namespace) -> Board:
 
     (columns, rows), side = options.board, options.square_mm / 1000
     marker = None if options.marker_mm is None else options.marker_mm / 1000
-    kind = options.kind or ("charuco" if options.charuco else "chessboard")
+    kind = options.kind or ("charuco" if options.charuco else "markers" if options.markers else "chessboard")
     if (kind == "charuco") != bool(options.charuco):
         raise Refusal("--charuco DICT and --kind charuco go together: name the dictionary of the markers.")
-    if marker is not None and kind in ("chessboard", "aprilgrid"):
+    if (kind == "markers") != bool(options.markers):
+        raise Refusal("--markers DICT and --kind markers go together: name the dictionary of the markers.")
+    if min(columns, rows) < 2 and kind != "markers":
+        raise Refusal(
+            "--board must have two columns and two rows at least; one alone can be a marker (--markers DICT)."
+        )
+    if marker is not None and kind in ("chessboard", "aprilgrid", "markers"):
         raise Refusal("--marker-mm is for a ChArUco board: name its dictionary with --charuco.")
-    if options.spacing is not None and kind != "aprilgrid":
-        raise Refusal("--spacing is for --kind aprilgrid.")
+    if options.spacing is not None and kind not in ("aprilgrid", "markers"):
+        raise Refusal("--spacing is for --kind aprilgrid and for --markers.")
     printed = _printed(options)
-    if kind != "charuco" and printed != AS_OPENCV:
-        raise Refusal("--legacy, --first-id and --border-bits are for a ChArUco board: name its dictionary.")
+    if kind not in ("charuco", "markers") and printed != AS_OPENCV:
+        raise Refusal(
+            "--legacy, --first-id and --border-bits are for a ChArUco board or for markers: name their dictionary."
+        )
     if kind == "aprilgrid":
         return Board.aprilgrid(columns, rows, side, options.spacing or SPACING)
+    if kind == "markers":
+        return _markers(options, columns, rows, side)
     if kind != "charuco":
         return Board(columns, rows, side, marker, kind=kind)
     name = "DICT_" + options.charuco.removeprefix("DICT_")
     board = Board(columns, rows, side, 0.75 * side if marker is None else marker, name, **printed)
     charuco_dictionary(board)
     return board
+
+
+def _markers(options: argparse.Namespace, columns: int, rows: int, side: float) -> Board:
+    from camviz_clinic.calibration.boards.charuco import marker_dictionary
+    from camviz_clinic.calibration.types import Board
+
+    if options.legacy:
+        raise Refusal("--legacy is for a ChArUco board: name its dictionary with --charuco.")
+    name = "DICT_" + options.markers.removeprefix("DICT_")
+    held, needed = len(marker_dictionary(name).bytesList), options.first_id + columns * rows
+    if held < needed:
+        raise Refusal(f"--markers must have the {needed} markers of this grid, {name} has {held}.")
+    spacing, bits = options.spacing or SPACING, options.border_bits
+    return Board.marker_grid(columns, rows, side, name, spacing, first_id=options.first_id, border_bits=bits)

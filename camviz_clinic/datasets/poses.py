@@ -27,7 +27,7 @@ from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.boards.charuco import FEWEST
 from camviz_clinic.calibration.detection import Detections
 from camviz_clinic.calibration.outliers import outliers
-from camviz_clinic.calibration.problem import POSE
+from camviz_clinic.calibration.problem import LEAST_CORNERS, POSE
 from camviz_clinic.calibration.types import Board, Mask
 from camviz_clinic.checks.rig import board_poses
 
@@ -180,10 +180,14 @@ def _best(problem: Adjustment) -> tuple[Adjustment, Adjustment]:
 
 
 def _settled(problem: Adjustment) -> Adjustment:
-    """At the least squares, with the corners set aside that contradict the others."""
+    """At the least squares, with the corners set aside that contradict the others.
+
+    Of four corners, as of one marker, each is needed: where they disagree, the view's own scatter makes its ± larger.
+    """
     problem = _trimmed(problem)
+    spare = np.isfinite(problem.detections["camera"]).all(axis=-1).sum(axis=1) > LEAST_CORNERS
     for turn in range(ROUNDS):
-        found = outliers(problem, at_first=turn == 0)
+        found = {"camera": outliers(problem, at_first=turn == 0)["camera"] & spare[:, None]}
         if turn > ROUNDS / 2:  # one that changes sides again and again goes
             found = {"camera": found["camera"] | problem.set_aside["camera"]}
         if turn and np.array_equal(found["camera"], problem.set_aside["camera"]):

@@ -27,7 +27,7 @@ def kinds() -> Mapping[str, BoardKind]:
     Returns: One for each module of this package that has a KIND.
 
     >>> list(kinds())
-    ['chessboard', 'aprilgrid', 'asymmetric-circles', 'charuco', 'circles']
+    ['chessboard', 'aprilgrid', 'asymmetric-circles', 'charuco', 'circles', 'markers']
     """
     modules = [import_module(f"{__name__}.{each.name}") for each in iter_modules(__path__)]
     found = [module.KIND for module in modules if isinstance(getattr(module, "KIND", None), BoardKind)]
