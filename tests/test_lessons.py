@@ -6,11 +6,14 @@ import os
 import re
 import textwrap
 from base64 import b64decode
+from io import BytesIO
 from pathlib import Path
 from xml.etree import ElementTree
 
 import nbformat
+import numpy as np
 import pytest
+from PIL import Image
 
 from camviz_school.commands import lessons
 from camviz_school.course import notebooks, saved_outputs
@@ -358,3 +361,19 @@ def test_every_lesson_s_saved_outputs_are_fresh_and_static(path):
     assert images
     for image in images:
         ElementTree.fromstring(b64decode(image))  # a browser shows nothing of an image that is not well-formed
+
+
+@EACH
+def test_no_saved_picture_is_black_or_of_any_one_colour(path):
+    """Where a function is not written yet, the right picture stands in grey (`camviz.views.yours.faded`)."""
+    plain = []
+    for cell in notebooks.read(path).cells:
+        for output in cell.get("outputs", []):
+            html = output.get("data", {}).get("text/html", "")
+            vectors = re.findall(r"data:image/svg\+xml;base64,([\w+/=]+)", html)
+            drawn = [html, *(b64decode(one).decode() for one in vectors)]
+            for data in re.findall(r"data:image/(?:png|jpeg|webp);base64,([\w+/=]+)", "".join(drawn)):
+                pixels = np.asarray(Image.open(BytesIO(b64decode(data))).convert("RGB"), dtype=float)
+                if pixels.size > 1200 and np.ptp(pixels) < 8:  # marks and colour bars may be smaller
+                    plain.append((cell.id, pixels.shape))
+    assert plain == []
