@@ -69,7 +69,7 @@ def test_a_reader_s_function_is_drawn_in_orange_and_never_raises():
     view = ExposureView(yours=lambda r, v: np.cos(np.arctan(r / v)) ** 4, vignetting="cos⁴")
     assert "orange" in view.figure(draft=True).svg()
     assert "ZeroDivisionError" in view.but(yours=lambda r, v: 1 / 0).figure(draft=True).svg()
-    assert "returns nothing yet" in view.but(yours=lambda r, v: None).figure(draft=True).svg()
+    assert "yours appears here" in view.but(yours=lambda r, v: None).figure(draft=True).svg()
 
 
 def test_times_are_written_as_photographers_do():

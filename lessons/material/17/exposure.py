@@ -24,7 +24,7 @@ from camviz.sensors import Sensor
 from camviz.sensors.common_random_numbers import Draw, exposed
 from camviz.views import garden
 from camviz.views.base import View, choice, positive, slider
-from camviz.views.yours import tried
+from camviz.views.yours import YOURS_HERE, is_unwritten, tried
 
 FULL_WELL_E = 30_000.0
 READ_NOISE_E = 3.0
@@ -196,7 +196,7 @@ class ExposureView(View):
         shares = np.sqrt(counts / counts.max())
         marks = plot.upright(panel, float(np.log2(GREY)), "yellow dashed") + plot.upright(panel, 0, "red dotted")
         words = svg.text(panel.place((float(np.log2(GREY)), 1.1)) + (-5, 14), "18 %", "note end halo")
-        words += svg.text(panel.place((0.0, 1.1)) + (5, 14), "white", "note halo")
+        words += svg.text(panel.place((0.0, 1.1)) + (-5, 14), "white", "note end halo")
         content = plot.grid(panel, None, []) + plot.bars(panel, borders[:-1], borders[1:], shares, "fill-blue half")
         shown = panel.show(content + marks + words, title="Histogram")
         return shown + plot.axes(panel, "stops from white", "√ pixels", None, [(1.0, "most")])
@@ -240,7 +240,10 @@ class ExposureView(View):
             values, problem = tried(self.yours, (r[::3], FOCAL_MM), r[::3])
             places = panel.place(np.stack([r[::3], np.clip(values, -1, 3)], axis=-1))
             points = svg.line(places, "orange") + svg.dots(places, "orange", 6)
-            points += svg.paragraph((10, 20), problem, panel.width - 20, "note halo") if problem else ""
+            if is_unwritten(problem):
+                points += svg.text(panel.place((0.6 * _CORNER_MM, 0.42)), YOURS_HERE, "note middle halo")
+            elif problem:
+                points += svg.paragraph((10, 20), problem, panel.width - 20, "note halo")
         entries = [("ink thick", "now"), ("blue dashed", "cos⁴"), ("purple dashed", "rim")]
         entries += [("orange thick", "yours")] if self.yours else []
         content = curves + points + plot.legend(panel, entries, "bottom left")
