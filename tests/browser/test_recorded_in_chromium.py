@@ -44,13 +44,16 @@ UNIT = """root => { const svg = root.querySelector("[data-drag=eye]").closest(".
   return svg.clientWidth / svg.viewBox.baseVal.width }"""
 SAID = """words => { const said = document.querySelector(".camviz-said").textContent;
   return said && said.split("; ").every((part) => words.includes(part)) }"""
-MOVED_AT_ONCE = """() => new Promise((done) => new MutationObserver((_, watcher) => {
-  const root = document.querySelector(".camviz-recorded[data-live] .camviz-explorer");
-  if (!root) return;
-  watcher.disconnect();
-  hands.move(root, "k1", 0);
-  done();
-}).observe(document, { childList: true, subtree: true, attributes: true }))"""
+MOVED_AT_ONCE = """() => new Promise((done) => {
+  const moved = () => {
+    const root = document.querySelector(".camviz-recorded[data-live] .camviz-explorer");
+    if (root) hands.move(root, "k1", 0), done();
+    return Boolean(root);
+  };
+  if (moved()) return;   // it stood before this was asked: nothing will change any more
+  new MutationObserver((_, watcher) => moved() && watcher.disconnect())
+    .observe(document, { childList: true, subtree: true, attributes: true });
+})"""
 DRAWN = """html => { const holder = document.createElement("template");
   holder.innerHTML = html;
   for (const one of holder.content.querySelectorAll("image")) one.setAttribute("href", "");
