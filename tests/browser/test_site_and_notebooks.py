@@ -12,6 +12,7 @@ from built_site import LESSONS, ROOT, SITE
 from mistune import create_markdown
 
 from camviz.draw import prose
+from camviz.views.yours import is_unwritten
 from camviz_school.course.questions import predict_questions, quiz_questions
 from camviz_school.samples import local_sample
 
@@ -79,9 +80,12 @@ def test_the_page_has_every_line_of_code_and_every_printed_line(pair: Pair) -> N
     code = [one.get_text().strip() for one in pair.article.select(".cell_input pre")]
     assert code == [cell.source.strip() for cell in pair.cells("code") if cell.source.strip()]
     printed = "".join(one.get_text() for one in pair.article.select(".cell_output pre"))
+    waits = " ".join(one.get_text() for one in pair.article.select(".camviz-awaited"))
     for output in pair.outputs():
-        if output.output_type == "stream":
-            assert output.text.strip() in printed
+        lines = output.text.splitlines(keepends=True) if output.output_type == "stream" else []
+        assert "".join(line for line in lines if not is_unwritten(line)).strip() in printed
+        for name in re.findall(r"`(\w+)`", "".join(filter(is_unwritten, lines))):
+            assert name in waits  # said once, in the page's own words
 
 
 def test_the_page_has_every_picture_in_the_same_words(pair: Pair) -> None:
