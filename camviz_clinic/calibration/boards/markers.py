@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camviz_clinic.calibration.boards.aprilgrid import measures, points, tag_size, tags
-from camviz_clinic.calibration.boards.charuco import WIDEST_BORDER, marker_dictionary
+from camviz_clinic.calibration.boards.charuco import WIDEST_BORDER, marker_dictionary, printed
 from camviz_clinic.calibration.boards.kind import Area, Array, BoardKind, Drawing, Gray, Shape, cells, millimetres
 
 QUIET = 0.25  # of a marker's side: the white around the outer ones
@@ -162,11 +162,9 @@ def says(shape: Shape) -> str:
 def options(shape: Shape) -> str:
     across, down = tags(shape)
     ratio = round(shape.square_size / tag_size(shape) - 1, 6)
-    first = f" --first-id {shape.first_id}" * bool(shape.first_id)
-    border = f" --border-bits {shape.border_bits}" * (shape.border_bits != 1)
     return (
         f"--markers {shape.dictionary} --board {across}x{down} --square-mm {millimetres(tag_size(shape))} "
-        f"--spacing {ratio:g}{first}{border}"
+        f"--spacing {ratio:g}{printed(shape)}"
     )
 
 
