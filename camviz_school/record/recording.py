@@ -92,7 +92,7 @@ class RecordedPane:
         size: Bytes as transferred (gzip) once all photographs are there; the stills of `html` come on top.
         still: What stands on the page before any script.
         controls: Labels of the pane's controls, for which `html` keeps room.
-        panels: That buttons open, for which it keeps room as well.
+        panels: The words of the panels that buttons open, for which it keeps room as well.
 
     >>> from pathlib import Path
     >>> RecordedPane("A dot", Path("."), "d.js", ("d.js",), 41, {"x": 41}, 900, None).html("dots/")[:63]
@@ -108,7 +108,7 @@ class RecordedPane:
     size: int
     still: Picture | None = field(repr=False, compare=False)
     controls: tuple[str, ...] = ()
-    panels: int = 0
+    panels: tuple[str, ...] = ()
 
     def html(self, base: str = "") -> str:
         """The pane for a page that loads `replay.js`.
@@ -133,7 +133,7 @@ class RecordedPane:
 
     def _html(self, base: str, figure: Callable[[Picture], str]) -> str:
         stills = _room(self.controls) + figure(_lighter(self.still)) if self.still else ""
-        stills += '<div aria-hidden="true" style="height:34px"></div>' if self.still and self.panels else ""
+        stills += _row(self.panels) if self.still and self.panels else ""
         words = f"A still picture. With JavaScript it moves: {self.positions} positions are recorded."
         return (
             f'<div class="camviz-recorded" data-recording="{escape(base + self.pack)}" '
@@ -238,7 +238,7 @@ class _Recorder:
         names = (pack, self._source, *images)
         still, traits = self._pane.still(), self._pane.traits
         labels = tuple(control["label"] for control in traits.get("controls", ()))
-        room = labels, len(traits.get("panels", ()))
+        room = labels, tuple(panel["words"] for panel in traits.get("panels", ()))
         return RecordedPane(self._pane.title, self._folder, pack, names, len(states), counts, size, still, *room)
 
     def _written(self, kept: RecordedPane) -> RecordedPane:
@@ -318,8 +318,16 @@ def _room(controls: Sequence[str]) -> str:
     rows = "".join(f'<i style="{row};{font}">{escape(label)}{track}</i>' for label in controls)
     return (
         f'<div aria-hidden="true" style="display:grid;grid-template-columns:{wide};gap:4px 22px;padding:6px 2px 8px">'
-        f'{rows}<i style="height:26px;grid-column:1/-1"></i></div>'
+        f'{rows}<i class="camviz-foot-room" style="height:24px;grid-column:1/-1;font-size:13px"></i></div>'
     )
+
+
+def _row(panels: Sequence[str]) -> str:
+    """Room for the buttons that open panels: it breaks where theirs will."""
+    font = "font:normal 13px/24px system-ui,sans-serif"
+    buttons = "".join(f'<i style="height:24px;padding:0 13px;{font}">+ {escape(words)}</i>' for words in panels)
+    row = "display:flex;flex-wrap:wrap;gap:6px;padding:4px 2px;visibility:hidden"
+    return f'<div aria-hidden="true" style="{row}">{buttons}</div>'
 
 
 def _lighter(picture: Picture) -> Picture:

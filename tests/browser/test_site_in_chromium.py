@@ -169,6 +169,10 @@ def test_a_lesson_begins_with_its_picture_and_one_switch_shows_the_code(browser:
     folds, switch = page.locator("details.hide.above-input"), page.locator(".camviz-code button")
     shown = "all => all.filter((one) => one.checkVisibility() && one.querySelector('pre').checkVisibility()).length"
     assert folds.evaluate_all(shown) == 0
+    still = switch.bounding_box()["y"]
+    page.mouse.move(5, 5)
+    page.locator('.camviz-recorded[data-live="true"]').first.wait_for()
+    assert abs(switch.bounding_box()["y"] - still) <= 2  # a pane that comes to life pushes nothing from under a finger
     switch.click()
     assert folds.evaluate_all(shown) == folds.count() > 15
     switch.click()
