@@ -73,6 +73,12 @@ def test_every_image_of_a_still_is_a_whole_document(name):
         assert ElementTree.fromstring(b64decode(image)).tag == "{http://www.w3.org/2000/svg}svg"
 
 
+def test_a_tile_that_a_telephone_scrolls_takes_the_next_line_elsewhere_before_it_is_scrolled():
+    wide, narrow = (Tile("plot", (0, 0, width, 300), "<g data-panel></g>").style() for width in (640, 600))
+    assert "1 max(560px," in wide
+    assert "1 max(432px," in narrow
+
+
 def test_a_tick_gives_way_to_a_title_and_a_label_moves_beside_another():
     title, tick = svg.text((10, 20), "Title", "title"), svg.text((12, 22), "0.5", "tick")
     assert uncluttered(title + tick, DESK) == title

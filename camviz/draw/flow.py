@@ -17,6 +17,7 @@ FLOW_WIDTH = "max(800px,138vh)"  # of a picture, so that its main panel and the 
 _PRESENTED = "var(--camviz-scale,1)*"  # how much larger a presentation shows everything
 STILL = 1.2  # picture units that make a CSS pixel in a still, which is drawn once for columns of 650 to 1000 pixels
 SCROLLED = 620  # picture units: a wider tile is scrolled sideways on a telephone
+_SCROLLED_PX = 560  # how wide it is shown there
 
 Cell = tuple[float, float, float, float]
 """Left, top, width and height, in picture units."""
@@ -56,12 +57,13 @@ class Tile:
 
         In a wide line the tiles of a row fill it as in the saved picture. A tile goes to the next line rather than
         shrink to less than 0.72 of its size, and grows to half as much again; words alone keep their size more closely.
+        One that a telephone scrolls goes there rather than be scrolled beside others.
         `scaled` is a factor of these sizes, as CSS with its "*".
         """
         width, (least, most) = self.cell[2], self._sizes
-        share = 100 * width / WIDTH
+        share, narrowest = 100 * width / WIDTH, max(least * width, _SCROLLED_PX if width > SCROLLED else 0)
         return (
-            f"--w:{width:g};flex:{width:g} 1 max({scaled}{least * width:g}px,{0.97 * share:.4g}%);min-width:0;"
+            f"--w:{width:g};flex:{width:g} 1 max({scaled}{narrowest:g}px,{0.97 * share:.4g}%);min-width:0;"
             f"max-width:max({scaled}{most * width:g}px,{share:.4g}%)"
         )
 
@@ -89,7 +91,7 @@ class Tile:
         tall = ";height:auto" if later else ""
         if self.cell[2] <= SCROLLED:
             return f'<img alt="{escape(words)}"{kept} style="{self.style()}{tall}" src="{source}">'
-        image = f'<img alt="{escape(words)}"{kept} style="width:100%;min-width:560px{tall}" src="{source}">'
+        image = f'<img alt="{escape(words)}"{kept} style="width:100%;min-width:{_SCROLLED_PX}px{tall}" src="{source}">'
         return f'<div style="{self.style()};overflow-x:auto">{image}</div>'
 
     @property
