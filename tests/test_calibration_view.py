@@ -59,6 +59,14 @@ def test_parallel_boards_leave_a_tiny_error_and_a_wrong_focal_length():
     assert tilted.held_out < 1.5 * tilted.adjustment.rms
 
 
+def test_the_number_of_an_error_stands_clear_of_the_mark_of_the_noise_alone():
+    figure = CalibrationView(boards=3, distance=0.9, noise=0.5, panels="picture errors").figure(draft=True).body
+    (mark,) = re.findall(r'<text x="([\d.]+)"[^>]*>noise alone', figure)
+    numbers = [float(x) for x in re.findall(r'<text x="([\d.]+)"[^>]*class="number halo"', figure)]
+    assert len(numbers) == 2
+    assert min(abs(x - float(mark)) for x in numbers) > 5
+
+
 def test_what_a_flat_board_shows_is_fx_over_z():
     view = CalibrationView(tilt=2.0)
     true, found = (float(line.split("=")[1].split()[0]) for line in view.levers())

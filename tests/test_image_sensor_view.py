@@ -8,6 +8,7 @@ import pytest
 from test_tiles import problems, unit_on_a_telephone
 
 from camviz.cameras import Camera, Intrinsics
+from camviz.draw.flow import STILL
 from camviz.scenes import textured_scene, to_display
 from camviz.sensors import decibel, gliding, rolling_picture
 from camviz_school.course.material import module
@@ -162,6 +163,8 @@ def test_a_right_count_of_the_readers_stands_beside_the_right_one(model):
     by_channel = 4091 * float(view.sensor.efficiency(555)) * 1000 / 64 * 0.007
     assert view.green_e == pytest.approx(by_channel * view.camera(4).pitch_um ** 2, rel=2e-4)
     assert view.figure().body.count(f">{float(f'{electrons:.3g}'):,.0f}</text>") == 2
+    (tile,) = (tile for tile in view.figure().tiles if tile.name == "electrons")
+    assert all(f">{name}</text>" in tile.uncluttered(STILL) for name in ("clear", "555 nm", "yours"))
 
 
 @pytest.mark.parametrize("function", [nothing_yet, lambda *given: 1 / 0])

@@ -87,10 +87,10 @@ def figures_on(panel: Panel, values: Array) -> str:
     """
     places_of = panel.place(np.stack([np.arange(len(values)) + 1, values], axis=-1))
     width = 0.9 * panel.width / (panel.right - panel.left)
-    zigzag = np.stack([np.linspace(-width / 2, width / 2, 7), 22 + 4.0 * (-1) ** np.arange(7)], axis=-1)
+    zigzag = np.stack([np.linspace(-width / 2, width / 2, 7), 30 + 4.0 * (-1) ** np.arange(7)], axis=-1)
     breaks = [zigzag + (x, 0) for (x, _), value in zip(places_of, values, strict=True) if value > panel.top]
     figures = [
-        svg.text((x, max(y - 4, 12)), f"{value:.2f}", "tick middle halo clear")
+        svg.text((x, max(y - 4, 16)), f"{value:.2f}", "tick middle halo clear")
         for (x, y), value in zip(places_of, values, strict=True)
     ]
     return svg.path(breaks, "paper-line cut") + "".join(figures if len(values) <= NAMED else ())

@@ -141,7 +141,7 @@ class ResidualsView(ViewChooser, OrbitView):
         aside = "; blue: corners used, pale red: with those set aside" if np.isfinite(all_seen).any() else ""
         aside += "; broken: cut" if np.nanmax(seen.rms_seen, initial=0) > panel.top else ""
         words = f"dashed: all views, {_pixels(seen.total_rms)}{aside}"
-        place = (panel.x + panel.width - (90 if handle else 0), panel.y - 8)
+        place = (panel.x + panel.width - (112 if handle else 0), panel.y - 8)
         return shown + svg.text(place, words, "note end") + plot.axes(panel, "", "RMS [px]", xticks=self._view_names())
 
     def _linked_bar(self, panel: Panel, i: int, link: str | None) -> str:

@@ -95,14 +95,12 @@ class ErrorBars(BoardPictures):
             return title + svg.paragraph((x, y + 56), NOTHING, cell[2] - 28, "label")
         bars = [("on the boards it was fitted to", self.adjustment.rms, "fill-blue")]
         bars += [("on boards it has not seen", self.held_out, "fill-red")] if np.isfinite(self.held_out) else []
-        parts = [_bar(x, y + 40 + 64 * i, longest, *bar) for i, bar in enumerate(bars)]
-        return title + self._noise_mark(x, y, longest) + "".join(parts)
+        mark = 0.0 if self.seen is not None or self.noise < _LOW else longest * _share(np.sqrt(2) * self.noise)
+        parts = [_bar(x, y + 40 + 64 * i, longest, *bar, mark) for i, bar in enumerate(bars)]
+        return title + (self._noise_mark(x + mark, y) if mark else "") + "".join(parts)
 
-    def _noise_mark(self, x: float, y: float, longest: float) -> str:
+    def _noise_mark(self, x: float, y: float) -> str:
         """What the noise alone would leave: √2 times its standard deviation in u and v."""
-        if self.seen is not None or self.noise < _LOW:
-            return ""
-        x += longest * _share(np.sqrt(2) * self.noise)
         mark = svg.segments([(x, y + 60), (x, y + 124)], [(x, y + 84), (x, y + 148)], "ink")
         return mark + svg.text((x, y + 166), "noise alone", "tick middle")
 
@@ -164,12 +162,14 @@ class ErrorBars(BoardPictures):
         return svg.text((x, y), f"fx / Z of board {self.index + 1}, px/m", "note") + "".join(lines)
 
 
-def _bar(x: float, y: float, longest: float, words: str, value: float, class_: str) -> str:
-    """An error in pixels as a bar, with its name above it and its number at its end."""
+def _bar(x: float, y: float, longest: float, words: str, value: float, class_: str, mark: float) -> str:
+    """An error in pixels as a bar, with its name above it and its number at its end, or beyond a mark close to it."""
+    length = longest * _share(value)
+    end = mark if length < mark < length + _NUMBER else length
     return (
         svg.text((x, y + 12), words, "label")
-        + svg.rectangle(x, y + 22, longest * _share(value), 20, class_, rx=2)
-        + svg.text((x + 6 + longest * _share(value), y + 37), f"{_digits(value)} px", "number halo")
+        + svg.rectangle(x, y + 22, length, 20, class_, rx=2)
+        + svg.text((x + 6 + end, y + 37), f"{_digits(value)} px", "number halo")
     )
 
 

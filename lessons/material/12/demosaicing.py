@@ -307,7 +307,7 @@ class DemosaicingView(View):
         content = svg.image("spectrum", 0, 0, panel.width, panel.height) + _rings(panel.place(places), 9)
         axes = plot.axes(panel, "fu [cycles/px]", "fv [cycles/px]", _TICKS, _TICKS)
         x, y = self._corner("spectrum", 4, 256)
-        listed = [svg.text((x, y), "○ seen as colour, how strongly", "note")]
+        listed = [svg.text((x, y), "○ as colour, how strongly", "note")]
         for i, carrier in enumerate(mosaics.carriers(self.filters)[:6]):
             left, top = x + 118 * (i % 2), y + 19 + 18 * (i // 2)
             listed.append(svg.text((left, top), f"{_place(carrier)}", "tick"))

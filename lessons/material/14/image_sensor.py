@@ -198,12 +198,12 @@ class ImageSensorView(View):
         """Electrons of each channel beside the full well and the threshold, on a logarithmic scale."""
         low, high = 0.0, float(np.log10(3 * _MOST_E))
         freed = dict(zip(("red", "green", "blue", "ink"), self.white_e, strict=True))
-        names = ["red", "green", "blue", "no filter"]
+        names = ["red", "green", "blue", "clear"]
         if self.yours:
             freed |= {"muted": self.green_e, "orange": self.your_e[0]}
             names += ["555 nm", "yours"]
         x, y, *_ = self._layout["electrons"]
-        panel = plot_panel("electrons", x + 66, y + 34, 344, 156, (0.4, len(names) + 1.9), (low, high))
+        panel = plot_panel("electrons", x + 66, y + 34, 344, 156, (0.4, len(names) + 1.55), (low, high))
         yticks = logarithmic(low, high)
         xticks = [(i + 1.0, name) for i, name in enumerate(names)]
         content = grid(panel, xticks=[], yticks=yticks)

@@ -236,8 +236,8 @@ class ReadoutView(View):
             + svg.path([outline], "blue thin", closed=True)
             + curve(panel, read, rows, "orange thick")
             + upright(panel, 1e3 * self.frame_s * self.time / 100, "ink")
-            + svg.text((panel.width - 8, 18), "exposed", "blue halo end")
-            + svg.text((panel.width - 8, 36), "read", "orange halo end")
+            + svg.text((panel.width - 22, 18), "exposed", "blue halo end")
+            + svg.text((panel.width - 22, 36), "read", "orange halo end")
             + self._your_line(panel)
         )
         shown = panel.show(
