@@ -35,6 +35,7 @@ def wedge_panel(
     edge = (end, B - end * (disparity - plus_minus) / f)
     wedge = svg.polygon(panel.place([(0, B), edge, (end, 0), (near, 0)]), "wash fill-orange") if worth else ""
     sides = svg.path([panel.place([(0, B), tip]) for tip in ((near, 0), edge)], "orange thin") if worth else ""
+    named, words = (right, "blue halo end") if right / 2 > Z else (0, "blue halo")  # where the orange ray is not
     error = _error(panel, f * B, right, B, (near, min(far, right)), notes[1]) if worth else ""
     content = (
         plot.grid(panel)
@@ -46,7 +47,7 @@ def wedge_panel(
         + svg.dots(panel.place([(Z, 0)]), "red", 8)
         + svg.dots(panel.place([(0, 0), (0, B)]), "ink", 9)
         + svg.text(panel.place((0, B)) + (9, -6), "right camera", "orange halo")
-        + svg.text(panel.place((0, 0)) + (9, -7), "the left camera’s ray", "blue halo")
+        + svg.text(panel.place((named, 0)) + (9 if named == 0 else -8, -7), "the left camera’s ray", words)
         + svg.text((panel.width - 8, 16), notes[0], "note end halo")
     )
     title = "What a disparity is worth" if worth else "Where the two rays meet"
