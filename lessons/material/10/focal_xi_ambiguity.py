@@ -24,15 +24,15 @@ def focal_xi_ambiguity_picture(
     tiles, attached = list[Tile](), dict[str, bytes]()
     for i, (caption, one) in enumerate(maps):
         left, limits = i * width, ((one.xi[0], one.xi[-1]), (one.focal[0], one.focal[-1]))
-        panel = plot.plot_panel(f"valley{i}", left + 64, 34, width - 150, 300, *limits)
+        panel = plot.plot_panel(f"valley{i}", left + 64, 34, width - 160, 300, *limits)
         misfit = np.clip(one.misfit.T[::-1], shades.low, None)
         coloured, picture = heat(panel, f"valley{i}", misfit, shades)
         truth = [] if true_xi is None or true_focal is None else [(true_xi, true_focal)]
         marks = _line(panel, one) + svg.dots(panel.place(truth) if truth else [], "red", 11)
         lens, pixels = one.camera.lens, one.camera.intrinsics
         marks += _plus(panel.place((lens.xi, pixels.fx)))  # type: ignore[attr-defined]
-        scale, key = bar(left + width - 68, 54, 280, "scale", shades, "RMS, px")
-        content = coloured + contours(panel, misfit, shades, " px") + marks
+        scale, key = bar(left + width - 78, 54, 280, "scale", shades, "RMS, px")
+        content = coloured + contours(panel, misfit, shades) + marks
         body = plot.axes(panel, "ξ", "f in px", aside=46) + panel.show(content, title=caption) + scale
         tiles.append(Tile(caption, (left, 0.0, width, 386.0), body))
         attached |= picture | key
