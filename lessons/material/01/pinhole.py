@@ -316,8 +316,8 @@ class PinholeView(OrbitView):
         content = (
             logarithmic_grid(panel, _HOLE_TICKS, _BLUR_TICKS)
             + "".join(curve(panel, np.log10(hole), np.log10(y), class_) for y, class_ in lines)
-            + svg.text((panel.width - 10, right[1] + 36), "the hole's shadow", "orange halo end")
-            + svg.text(left + (0, 34), "diffraction", "green halo")
+            + svg.text((panel.width - 10, right[1] + 62), "the hole's shadow", "orange halo end")
+            + svg.text(left + (0, 50), "diffraction", "green halo")
             + svg.text(right + (-14, -8), "both together", "blue halo end")
             + self._best_mark(panel)
             + svg.dots([panel.place(logs((self.hole_mm, self.blur_mm)))], "red", 11)

@@ -89,8 +89,12 @@ def _film(shear: float) -> str:
     over = 1 - shear * _PITCH / _PLACE
     at = _LENS_X + _FILM / over if over > 0 else np.inf
     if at > _WIDTH - 8:
-        return svg.text((_WIDTH - 6, _HEIGHT - 8), "film for this shear: beyond", "red end halo")
+        return _below_each_other(_WIDTH - 6, ("film for this", "shear: beyond"), "red end halo")
     side = "end" if at > _LENS_X + _FILM - 40 else ""
-    return svg.line([(at, 0), (at, _HEIGHT)], "red dashed") + svg.text(
-        (at + (-6 if side else 6), _HEIGHT - 8), "film for this shear", f"red halo {side}"
-    )
+    names = _below_each_other(at + (-6 if side else 6), ("film for", "this shear"), f"red halo {side}")
+    return svg.line([(at, 0), (at, _HEIGHT)], "red dashed") + names
+
+
+def _below_each_other(x: float, words: tuple[str, str], class_: str) -> str:
+    """Two short lines at the foot, where one would lie on the sensor."""
+    return "".join(svg.text((x, y), line, class_) for y, line in zip((_HEIGHT - 24, _HEIGHT - 8), words, strict=True))
