@@ -47,9 +47,8 @@ class Problem:
     independent_corners: bool = False
 
     def __post_init__(self) -> None:
-        corners = self.board.columns * self.board.rows
         for name in self.cameras:
-            shape, expected = self.detections[name].shape, (len(self.first_from_board), corners, 2)
+            shape, expected = self.detections[name].shape, (len(self.first_from_board), len(self.board.corners), 2)
             if shape != expected:
                 raise ValueError(f"detections of {name} must have shape {expected} (views, corners, 2), got {shape}")
 
@@ -247,7 +246,7 @@ def _first_from_board(
 def _fix_a_pose(board: Board, seen: Mask) -> Mask:
     """Which views (views,) show enough of the board for its pose: four corners that are not all on one line."""
     count = seen.sum(axis=1)
-    xy = board.corners[:, :2] / board.square_size
-    centred = np.where(seen[..., None], xy - (seen @ xy / np.maximum(count, 1)[:, None])[:, None], 0)
-    spread = np.linalg.eigvalsh(np.swapaxes(centred, 1, 2) @ centred)[:, 0]
+    points = board.corners / board.square_size
+    centred = np.where(seen[..., None], points - (seen @ points / np.maximum(count, 1)[:, None])[:, None], 0)
+    spread = np.linalg.eigvalsh(np.swapaxes(centred, 1, 2) @ centred)[:, 1]  # across their longest direction
     return (count >= LEAST_CORNERS) & (spread > 1e-6)

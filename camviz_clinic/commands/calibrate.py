@@ -6,6 +6,7 @@ import argparse
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,11 +44,21 @@ from camviz_clinic.commands.rig import (
     usual_name,
 )
 from camviz_clinic.commands.rolling import ROLLING, add_rolling, calibrate_rolling, is_rolling
+from camviz_clinic.commands.several import (
+    BOARDS,
+    add_boards,
+    places_toml,
+    read_boards,
+    refuse_beside_boards,
+    several_of_pictures,
+    told_of,
+)
 from camviz_clinic.commands.telling import report, worth
 
 if TYPE_CHECKING:
     from camviz_clinic.calibration import CannotCalibrate, Detections
     from camviz_clinic.checks import Inspection
+    from camviz_clinic.checks.gate import Gate
     from camviz_clinic.files import Board, Calibration
     from camviz_clinic.files.corners import LoadedCorners
 
@@ -77,6 +88,7 @@ examples:
   camviz calibrate --corners left.vnl --right right.vnl --board 9x6 --square-mm 25 --size 640x480
   camviz calibrate left/ --right right/ --board 9x6 --square-mm 25 -o stereo.yaml
   camviz calibrate --rig cam0/ cam1/ cam2/ --board 9x6 --square-mm 50 --model-of cam2=fisheye -o rig.toml
+  camviz calibrate --rig cam0/ cam1/ --boards plate.toml --places solved.toml -o rig.toml
   camviz calibrate shots/ --board 10x7 --square-mm 18 --charuco 5X5_100 --marker-mm 13.5 --model fisheye
   camviz calibrate shots/ --board 9x6 --square-mm 25 --fail-on warning --limit rms-px=0.5 --junit clinic.xml
 """
@@ -98,7 +110,7 @@ def add(commands: Any) -> None:
         "calibrate",
         calibrate,
         "calibrate a camera, a pair or a rig from pictures or films",
-        f"{CALIBRATE}\n{FILMS}\n{ROLLING}\n{RIG}",
+        f"{CALIBRATE}\n{FILMS}\n{ROLLING}\n{RIG}\n{BOARDS}",
     )
     models = "".join(f"  {name:11} {says}\n" for name, says in MODELS.items())
     command.epilog = f"models:\n{models}\n{EXAMPLES}\n{GATE}\n{STATUS}"
@@ -107,6 +119,7 @@ def add(commands: Any) -> None:
         "--right", metavar="IMAGES", nargs="+", help="those of the right camera, or files of its corners"
     )
     add_rig(command)
+    add_boards(command)
     add_frames(command)
     add_board(command, required=False, default=False)
     add_corners(command)
@@ -169,11 +182,10 @@ def calibrate(options: argparse.Namespace) -> int:
 def _of_stills(options: argparse.Namespace, of_films: tuple[str, ...]) -> int:
     """The same of pictures, with what is to be said of the films that they are from."""
     from camviz_clinic.calibration import CannotCalibrate
-    from camviz_clinic.checks import inspect
-    from camviz_clinic.files import CalibrationError
 
     left, right = pictures(options.images) if options.images else [], _right(options)
-    cameras = by_camera(options.rig, pictures) if options.rig else {"left": left, "right": right}
+    single = {"camera": left} if options.boards else {"left": left, "right": right}
+    cameras = by_camera(options.rig, pictures) if options.rig else single
     shots = [path for paths in cameras.values() for path in paths]
     sources = [*shots, *(options.corners or [])]
     form = format_of_rig(options) if options.rig else "opencv"
@@ -181,21 +193,21 @@ def _of_stills(options: argparse.Namespace, of_films: tuple[str, ...]) -> int:
     refuse_output(options.output, "calibration", *sources)
     if options.report:
         refuse_output(options.report, "page", options.output, *sources)
+    if options.places:
+        refuse_output(options.places, "file", options.output, *sources)
     gate = given_gate(options)
     refuse_junit(options, options.output, *([options.report] if options.report else []), *sources)
+    given = list(cameras.values()) if not options.corners else [left or options.corners, right]
+    folders = dict(zip(cameras, (each[0].parent for each in given if each), strict=False))
+    if options.boards:
+        return _of_boards(cameras, folders, options, form, gate)
     try:
         calibration = _of_corners(left, right, options) if options.corners else _of_pictures(cameras, options)
     except CannotCalibrate as error:
         raise Refusal(_complaint(error, shots, options)) from error
     calibration = replace(calibration, notes=(*of_films, *calibration.notes))
-    calibration = _stamped(calibration, list(cameras.values()), options)
-    try:
-        left_out = write_calibration(calibration, options.output, form)
-    except CalibrationError as error:
-        raise Refusal(str(error)) from error
-    except OSError as error:
-        refuse_exhausted(error)
-        raise Refusal(f"{options.output}: cannot be written ({error.strerror or error}).") from error
+    calibration = _stamped(calibration, calibration, list(cameras.values()), options)
+    left_out = _written(calibration, options, form)
     calibration = replace(calibration, source=options.output)
     told = narrator(options.output)
     for sentence in [*report(calibration), *(placed(calibration) if options.rig else [])]:
@@ -204,16 +216,58 @@ def _of_stills(options: argparse.Namespace, of_films: tuple[str, ...]) -> int:
         told(sentence)
     if doctored := "" if options.rig or is_rolling(options) else _prescribed(shots, options, calibration):
         told(f"Is the board as described? {doctored}")
-    told(f"{options.output}: written.{' ' * bool(left_out)}{' '.join(left_out)}")
+    told(f"{options.output}: written.{left_out}")
+    return _judged(calibration, dict(zip(calibration.cameras, folders.values(), strict=True)), options, gate)
+
+
+def _of_boards(
+    cameras: Mapping[str, list[Path]], folders: Mapping[str, Path], options: argparse.Namespace, form: str, gate: Gate
+) -> int:
+    """The same where several boards are in the pictures; what is inspected is what the largest of them shows."""
+    from camviz_clinic.calibration import CannotCalibrate
+
+    file = read_boards(options.boards)
+    try:
+        solved = several_of_pictures(cameras, file, options, partial(_looked, options=options), _how(options))
+    except CannotCalibrate as error:
+        raise Refusal(f"{error}.") from error
+    inspected = solved.through(solved.largest)
+    calibration = _stamped(solved.calibration, inspected, list(cameras.values()), options)
+    left_out, told = _written(calibration, options, form), narrator(options.output)
+    for sentence in [*told_of(solved, file), *calibration.notes]:
+        told(sentence)
+    told(f"{options.output}: written.{left_out}")
+    if options.places:
+        write_whole(options.places, lambda path: path.write_text(places_toml(solved, file), encoding="utf-8"))
+        told(f"{options.places}: written; --boards reads it.")
+    inspected = replace(inspected, stamps=calibration.stamps, source=options.output)
+    return _judged(inspected, folders, options, gate)
+
+
+def _written(calibration: Calibration, options: argparse.Namespace, form: str) -> str:
+    """Writes it; what the format could not hold, in sentences after a space."""
+    from camviz_clinic.files import CalibrationError
+
+    try:
+        return "".join(f" {sentence}" for sentence in write_calibration(calibration, options.output, form))
+    except CalibrationError as error:
+        raise Refusal(str(error)) from error
+    except OSError as error:
+        refuse_exhausted(error)
+        raise Refusal(f"{options.output}: cannot be written ({error.strerror or error}).") from error
+
+
+def _judged(calibration: Calibration, folders: Mapping[str, Path], options: argparse.Namespace, gate: Gate) -> int:
+    """Inspects it and writes the page, where that is asked for; the exit status."""
+    from camviz_clinic.checks import inspect
+
     decides = gate.asked or options.junit is not None
     if not (options.report or decides):
         return OK
-    outcome = gate.judge(inspect(calibration))
+    outcome, told = gate.judge(inspect(calibration)), narrator(options.output)
     told("\n".join(["", outcome.inspection.as_text(), *outcome.lines()]))
     if options.report:
-        given = list(cameras.values()) if not options.corners else [left or options.corners, right]
-        folders = [each[0].parent for each in given if each]
-        _page(outcome.inspection, dict(zip(calibration.cameras, folders, strict=True)), options.report)
+        _page(outcome.inspection, folders, options.report)
         told(f"{options.report}: open it in a browser.")
     write_junit(options, {str(options.output): outcome})
     return OK if outcome.passed or not decides else FOUND
@@ -223,7 +277,10 @@ def _refuse_words(options: argparse.Namespace) -> None:
     """Refuses a command that lacks what it works on, or that says it twice."""
     square = options.square_mm or isinstance(options.board, Path)
     refuse_mixed(options)
+    refuse_beside_boards(options)
     needed = {"IMAGES": options.images or options.rig, "--board": options.board, "--square-mm": square}
+    if options.boards:
+        needed = {"IMAGES": options.images or options.rig}
     missing = [word for word, given in needed.items() if not given]
     if missing and not options.corners:
         raise Refusal(f"the following arguments are required: {', '.join(missing)}; see `camviz calibrate --help`.")
@@ -278,8 +335,13 @@ def _of_pictures(cameras: Mapping[str, list[Path]], options: argparse.Namespace)
     return _pair(left, right, board, options) if right else _single(left, board, options)
 
 
-def _stamped(calibration: Calibration, shots: list[list[Path]], options: argparse.Namespace) -> Calibration:
-    """With what the calibration of each camera holds for; and a note where the setting changed between its pictures."""
+def _stamped(
+    calibration: Calibration, seen: Calibration, shots: list[list[Path]], options: argparse.Namespace
+) -> Calibration:
+    """With what the calibration of each camera holds for; and a note where the setting changed between its pictures.
+
+    `seen` is the calibration with its views.
+    """
     from camviz import __version__
     from camviz_clinic.calibration.stamp import Stamp, now
     from camviz_clinic.checks.stamps import settings_differ
@@ -289,7 +351,7 @@ def _stamped(calibration: Calibration, shots: list[list[Path]], options: argpars
     stamps = {
         name: Stamp.of(
             pictures,
-            views=int(calibration.used(name).any(axis=1).sum()),
+            views=int(seen.used(name).any(axis=1).sum()),
             **made | {"model": models.get(name, options.model)},
         )
         for name, pictures in zip(calibration.cameras, shots, strict=False)
@@ -311,7 +373,7 @@ def _prescribed(paths: list[Path], options: argparse.Namespace, calibration: Cal
     """What the pictures show that is not as the board is described, and what to try; empty where nothing is."""
     from camviz_clinic.checks.doctor import Shown, diagnose, prescription
 
-    if options.corners:
+    if options.corners or options.boards:
         return ""
     shown = Shown.of(paths, board_of(options))
     baseline = None if options.baseline_mm is None else options.baseline_mm / 1000

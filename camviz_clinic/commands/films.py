@@ -66,6 +66,8 @@ def as_pictures(options: argparse.Namespace, how: Mapping[str, Any]) -> Iterator
     if not films and not any(HEIC.fullmatch(path.suffix) for path in paths):
         yield ()
         return
+    if films and getattr(options, "boards", None):
+        raise Refusal("--boards is for pictures: films are looked through for one board alone.")
     for output in (options.output, options.report, options.junit):
         if output:
             refuse_output(output, "file", *films)

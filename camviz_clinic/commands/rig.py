@@ -183,9 +183,9 @@ def placed(calibration: Calibration) -> list[str]:
         most = max(common, key=lambda other: common[other])
         tied = f"{common[most]} frame{'s' * (common[most] != 1)} tie{'s' * (common[most] == 1)} it to {most}"
         said.append(
-            f"{name} stands {_pm(1000 * beside.distance, 1000 * beside.distance_deviation)} mm from {names[0]} at "
+            f"{name} stands {pm(1000 * beside.distance, 1000 * beside.distance_deviation)} mm from {names[0]} at "
             f"x = {x}, y = {y}, z = {z} mm, turned by "
-            f"{_pm(np.degrees(beside.angle), np.degrees(beside.angle_deviation))}°; {tied}."
+            f"{pm(np.degrees(beside.angle), np.degrees(beside.angle_deviation))}°; {tied}."
         )
     return said
 
@@ -194,7 +194,8 @@ def _views(rig: Any, name: str) -> Any:
     return rig.used[name].any(axis=1)
 
 
-def _pm(value: float, sigma: float) -> str:
+def pm(value: float, sigma: float) -> str:
+    """A value with its σ, both rounded by it."""
     from camviz_clinic.checks.summary import measured
 
     return measured(float(value), float(sigma))

@@ -12,6 +12,7 @@ from camviz.cameras import transform
 from camviz.lenses.base import Array
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.arrowhead import Arrowhead
+from camviz_clinic.calibration.boards.charuco import FEWEST
 from camviz_clinic.calibration.clustered import ByView
 from camviz_clinic.calibration.jacobian import pixel_jacobian, twist_jacobian
 from camviz_clinic.calibration.linearisation import sagittas
@@ -44,6 +45,16 @@ class RigAdjustment(Adjustment):
 
     What are views elsewhere are frames here: moments of the whole rig, whose scatter gives the `covariance`.
     """
+
+    @property
+    def fewest(self) -> int:
+        """Corners that a view must keep to be believed."""
+        return min(FEWEST, len(self.board.corners))
+
+    @property
+    def boards(self) -> tuple[slice, ...]:
+        """Which corners are those of one board, which is found or mistaken as a whole."""
+        return (slice(None),)
 
     @cached_property
     def parts(self) -> dict[str, Seen]:

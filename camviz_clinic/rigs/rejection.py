@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from camviz.lenses.base import Array
-from camviz_clinic.calibration.boards.charuco import FEWEST
 from camviz_clinic.calibration.detection import seen
 from camviz_clinic.calibration.outliers import FALSE_ALARMS, FINEST, Masks
 from camviz_clinic.rigs.adjustment import RigAdjustment
@@ -18,16 +17,19 @@ HOPELESS = 30.0  # times the median of all views: a view that is that far off ha
 
 
 def hopeless(start: RigAdjustment) -> Masks:
-    """Which corners (frames, corners) belong to views that are far from where the chain of cameras puts them.
+    """Which corners (frames, corners) belong to views of a board that are far from where the chain of cameras puts it.
 
     Such a view, with its corners counted from another end or of another frame, could spoil the first solution.
     """
-    errors = {name: _medians(_distances(start, name)) for name in start.cameras}
-    usual = float(np.nanmedian(np.concatenate(list(errors.values()))))
-    return {
-        name: seen(start.detections[name]) & ~(error <= HOPELESS * max(usual, 1.0))[:, None]
-        for name, error in errors.items()
-    }
+    off = {name: _distances(start, name) for name in start.cameras}
+    errors = {name: [_medians(distances[:, board]) for board in start.boards] for name, distances in off.items()}
+    usual = float(np.nanmedian(np.concatenate([each for several in errors.values() for each in several])))
+    found = {}
+    for name, several in errors.items():
+        found[name] = seen(start.detections[name])
+        for board, error in zip(start.boards, several, strict=True):
+            found[name][:, board] &= ~(error <= HOPELESS * max(usual, 1.0))[:, None]
+    return found
 
 
 def deviation(adjustment: RigAdjustment, name: str, *, at_first: bool = False) -> float:
@@ -49,14 +51,19 @@ def limit(adjustment: RigAdjustment, name: str, *, at_first: bool = False) -> fl
 
 
 def outliers(adjustment: RigAdjustment, *, at_first: bool = False) -> Masks:
-    """Which corners (frames, corners) are to be set aside, by camera; a view that keeps less than half goes whole."""
+    """Which corners (frames, corners) are to be set aside, by camera.
+
+    A view of a board that keeps less than half goes whole, and so does all of a frame that keeps too few.
+    """
     found = {}
     for name in adjustment.cameras:
         there = seen(adjustment.detections[name])
         out = there & ~(_distances(adjustment, name) <= limit(adjustment, name, at_first=at_first))
-        kept = (there & ~out).sum(axis=1)
-        whole = (kept < FEWEST) | (kept < there.sum(axis=1) / 2)
-        found[name] = out | (there & whole[:, None])
+        for board in adjustment.boards:
+            kept = (there & ~out)[:, board].sum(axis=1)
+            out[:, board] |= there[:, board] & (kept < there[:, board].sum(axis=1) / 2)[:, None]
+        few = (there & ~out).sum(axis=1) < adjustment.fewest
+        found[name] = out | (there & few[:, None])
     return found
 
 

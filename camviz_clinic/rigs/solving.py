@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from camviz_clinic.rigs.start import alone, begun, spread_out
 
 MOST_ROUNDS = 12
 FORMAT = "camviz"
+Solution = TypeVar("Solution", bound=RigAdjustment)
 
 
 def calibrate_rig(
@@ -82,7 +84,7 @@ def calibrate_rig(
             raise CannotCalibrate(f"{name}: {error}") from error
         by_camera[name] = spread_out(own, [number[place] for place in each.places], len(frames))
     start = begun(by_camera, board)
-    solved = with_board_warp(_robust(start) if robust else _settled(start), board_warp, _robust if robust else _settled)
+    solved = with_board_warp(judged(start) if robust else settled(start), board_warp, judged if robust else settled)
     return _calibration(solved, detections, frames)
 
 
@@ -108,11 +110,11 @@ def _check(
             raise ValueError(f"places of {name} must be different frames, got one twice")
 
 
-def _robust(start: RigAdjustment) -> RigAdjustment:
+def judged(start: Solution) -> Solution:
     """Solved, judged and solved again until no corner changes sides."""
     adjustment = replace(start, set_aside=_together(start.set_aside, hopeless(start)))
     for turn in range(MOST_ROUNDS):
-        adjustment = _settled(adjustment)
+        adjustment = settled(adjustment)
         found = outliers(adjustment, at_first=turn == 0)
         if turn > MOST_ROUNDS / 2:  # one that changes sides again and again goes
             found = _together(found, adjustment.set_aside)
@@ -120,15 +122,16 @@ def _robust(start: RigAdjustment) -> RigAdjustment:
             return adjustment
         _refuse_parted(adjustment, found)
         adjustment = replace(adjustment, set_aside=found)
-    return _settled(adjustment)
+    return settled(adjustment)
 
 
-def _settled(adjustment: RigAdjustment) -> RigAdjustment:
+def settled(adjustment: Solution) -> Solution:
+    """At the least sum of squares; CannotCalibrate where a lens folds at a corner."""
     try:
         solved = regularised(adjustment)
     except np.linalg.LinAlgError as error:  # a corner on the very fold of a lens
         raise CannotCalibrate(FOLDED) from error
-    assert isinstance(solved, RigAdjustment)
+    assert isinstance(solved, type(adjustment))
     return solved
 
 

@@ -11,6 +11,7 @@ from camviz.cameras import Camera
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.boards.charuco import FEWEST
 from camviz_clinic.calibration.denominator_prior import DenominatorPrior
 from camviz_clinic.calibration.detection import CannotCalibrate, Detections, seen
 from camviz_clinic.calibration.models import pose_from_rays
@@ -37,7 +38,8 @@ def alone(
         camera, estimated, priors = Camera(held.intrinsics, held.lens), _NOTHING, {}
     else:
         few = varied(corners, MOST_ALONE)
-        solved = calibrate(detections.only(few), board, model, fixed=fixed, robust=robust)
+        judged = robust and len(board.corners) > FEWEST  # of a single marker's four corners the rest says nothing
+        solved = calibrate(detections.only(few), board, model, fixed=fixed, robust=judged)
         camera, estimated, priors = solved.cameras["camera"], solved.estimated["camera"], dict(solved.priors)
     poses, known = board_poses(camera, board, corners)
     unknown = np.repeat(~known[:, None], corners.shape[1], axis=1)

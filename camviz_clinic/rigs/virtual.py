@@ -111,7 +111,7 @@ def rig(
 
     Returns: VirtualRig with cameras "cam0", "cam1" …; neighbours share three frames at least.
     """
-    placed = [_camera(rng, number in fisheye, radians(step_deg) * number, size) for number in range(cameras)]
+    placed = _around(rng, cameras, step_deg, fisheye, size)
     together = min(max(FEWEST_SHARED, round(shared * frames)), frames)
     poses: list[RigidTransform] = []
     masks: list[list[bool]] = []
@@ -132,6 +132,24 @@ def rig(
     return VirtualRig(by_name, BOARD, first * RigidTransform.concatenate(poses), seen)
 
 
+def placed_around(
+    rng: np.random.Generator, cameras: int, step_deg: float, fisheye: tuple[int, ...] = ()
+) -> tuple[dict[str, Camera], RigidTransform]:
+    """Cameras 1.2 m around the middle of a room that look inwards.
+
+    Args:
+        rng: Random numbers.
+        cameras: How many.
+        step_deg: Angle between neighbours, seen from the middle.
+        fisheye: Which of the cameras have a fisheye.
+
+    Returns: By name, in the first one's frame; and the pose of the room in that frame.
+    """
+    placed = _around(rng, cameras, step_deg, fisheye, SIZE)
+    first = placed[0].cam_from_world
+    return {f"cam{number}": camera.at(first * camera.world_from_cam) for number, camera in enumerate(placed)}, first
+
+
 def film(rng: np.random.Generator, cameras: int = 3, *, frames: int = 60, fisheye: tuple[int, ...] = ()) -> VirtualRig:
     """Such a rig that films a board which somebody carries around the room; it moves by centimetres between frames.
 
@@ -143,8 +161,8 @@ def film(rng: np.random.Generator, cameras: int = 3, *, frames: int = 60, fishey
 
     Returns: VirtualRig whose frames follow each other in time.
     """
-    placed = [_camera(rng, number in fisheye, radians(25) * number) for number in range(cameras)]
-    towards = placed[cameras // 2]
+    by_name, first = placed_around(rng, cameras, 25, fisheye)
+    towards = first.inv() * by_name[f"cam{cameras // 2}"].world_from_cam
     time = np.linspace(0, 1, frames)
 
     def wander(size: float, turns: float) -> Array:
@@ -154,10 +172,8 @@ def film(rng: np.random.Generator, cameras: int = 3, *, frames: int = 60, fishey
 
     middle = RigidTransform.from_translation(-BOARD.corners.mean(axis=0))
     turns = Rotation.from_rotvec(wander(0.3, 3))
-    swings = RigidTransform.from_components(wander(0.22, 2), towards.world_from_cam.rotation * turns)
-    first = placed[0].cam_from_world
+    swings = RigidTransform.from_components(wander(0.22, 2), towards.rotation * turns)
     poses = first * (swings * middle)
-    by_name = {f"cam{number}": camera.at(first * camera.world_from_cam) for number, camera in enumerate(placed)}
     points = moved(poses, BOARD.corners)
     seen = {name: np.all(inside(camera, camera.project(points)), axis=1) for name, camera in by_name.items()}
     return VirtualRig(by_name, BOARD, poses, seen)
@@ -198,6 +214,12 @@ def inside(camera: Camera, pixels: Array) -> Mask:
     grid = camera.intrinsics
     high = np.array([grid.width, grid.height]) - 1 - MARGIN
     return np.asarray(np.all((pixels > MARGIN) & (pixels < high), axis=-1))
+
+
+def _around(
+    rng: np.random.Generator, cameras: int, step_deg: float, fisheye: tuple[int, ...], size: tuple[int, int]
+) -> list[Camera]:
+    return [_camera(rng, number in fisheye, radians(step_deg) * number, size) for number in range(cameras)]
 
 
 def _camera(rng: np.random.Generator, fisheye: bool, angle: float, size: tuple[int, int] = SIZE) -> Camera:
