@@ -112,7 +112,7 @@ def test_a_marker_that_is_taken_for_another_is_set_aside_and_the_rest_stays():
 
 
 def test_the_equations_are_those_of_finite_differences():
-    truth, found = solved("two-sided", 4)
+    _, found = solved("two-sided", 4)
     adjustment = replace(found.adjustment, sized=(0,))
     normal = adjustment.normal_equations
     for part, place in ((1, adjustment.place_of_part(1)), (0, adjustment.place_of_size(0))):

@@ -22,7 +22,7 @@ def hopeless(start: RigAdjustment) -> Masks:
     Such a view, with its corners counted from another end or of another frame, could spoil the first solution.
     """
     off = {name: _distances(start, name) for name in start.cameras}
-    errors = {name: [_medians(distances[:, board]) for board in start.boards] for name, distances in off.items()}
+    errors = {name: [medians(distances[:, board]) for board in start.boards] for name, distances in off.items()}
     usual = float(np.nanmedian(np.concatenate([each for several in errors.values() for each in several])))
     found = {}
     for name, several in errors.items():
@@ -84,7 +84,7 @@ def sentences(adjustment: RigAdjustment) -> tuple[str, ...]:
     return tuple(said)
 
 
-def _medians(distances: Array) -> Array:
+def medians(distances: Array) -> Array:
     """Of every view (frames,); NaN where nothing was seen."""
     there = np.isfinite(distances).any(axis=1)
     found = np.full(len(distances), np.nan)

@@ -15,12 +15,13 @@ from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.detection import CannotCalibrate, Detections, seen
 from camviz_clinic.calibration.types import Board
 from camviz_clinic.rigs.placing import Placed, Sighting, placed
+from camviz_clinic.rigs.rejection import medians
 from camviz_clinic.rigs.start import CAPPED, alone
 from camviz_clinic.rigs.target import Target, TargetAdjustment
 
 Indices = NDArray[np.intp]
 MOST_PROPOSALS = 8  # poses that are tried for each view
-FAR = 6.0  # times the median of a view's corners
+FAR = 6.0  # times the median of a picture's corners
 
 
 def alone_before(
@@ -154,13 +155,14 @@ def _posed(start: TargetAdjustment, poses: Array, corners: Array) -> TargetAdjus
 
 
 def _settled(start: TargetAdjustment) -> TargetAdjustment:
-    """With each view's pose by the corners that most of it agrees with; the others have no say until all is solved for.
+    """With each view's pose by the corners that most of a picture agrees with; others have no say until all is solved.
 
     So a board that is mistaken for another does not spoil the first solution.
     """
-    off = {name: np.linalg.norm(residuals, axis=-1) for name, residuals in start.residuals.items()}
-    usual = np.nanmedian(np.concatenate(list(off.values()), axis=1), axis=1, keepdims=True)
-    aside = {name: start.set_aside[name] | (off[name] > FAR * usual) for name in off}
+    aside = {}
+    for name, residuals in start.residuals.items():
+        off = np.linalg.norm(residuals, axis=-1)
+        aside[name] = start.set_aside[name] | (off > FAR * medians(off)[:, None])
     better = replace(start, set_aside=aside).refined(only_poses=True)
     return replace(start, first_from_board=better.first_from_board, set_aside=aside)
 
