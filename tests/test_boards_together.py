@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from camviz_clinic.calibration import CannotCalibrate
-from camviz_clinic.rigs import relative_pose, virtual_boards
-from camviz_clinic.rigs.boards import calibrate_boards
+from camviz_clinic.rigs import calibrate_boards, relative_pose, virtual_boards
 
 SCENES = {
     "two-sided": (virtual_boards.two_sided, ()),

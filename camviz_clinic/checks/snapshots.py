@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -13,6 +14,7 @@ from camviz.cameras import Camera
 from camviz.lenses import Lens
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
+from camviz.scenes.light import to_encoded
 from camviz_clinic.calibration.boards.picture import whiteness
 from camviz_clinic.calibration.types import Board
 from camviz_clinic.checks.virtual import single, spread_boards
@@ -24,6 +26,7 @@ TEXELS = 32  # along `square_size`
 MARGIN = 0.6  # white around the board, in `square_size`
 FINER = 2  # samples along each side of a pixel
 BLUR = 0.6  # pixels
+PAPER = 2.0  # grey levels away from what is behind
 
 Single = NDArray[np.float32]
 
@@ -69,6 +72,22 @@ def snapshot(
     picture = cv2.resize(samples, (grid.width, grid.height), interpolation=cv2.INTER_AREA)  # the mean of each pixel's
     picture = cv2.GaussianBlur(picture, (0, 0), BLUR) + rng.normal(0, noise, picture.shape)
     return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
+
+
+def together(
+    camera: Camera,
+    boards: Sequence[Board],
+    cam_from_boards: RigidTransform,
+    rng: np.random.Generator,
+    noise: float = 2.0,
+) -> NDArray[np.uint8]:
+    """Several boards in one sRGB picture, uint8 grey (height, width); a later one covers what is behind its paper."""
+    whole = np.full((camera.intrinsics.height, camera.intrinsics.width), BEHIND)
+    for board, pose in zip(boards, cam_from_boards, strict=True):
+        one = snapshot(camera, board, pose, rng, noise=0.0).astype(float)
+        whole = np.where(np.abs(one - BEHIND) > PAPER, one, whole)
+    encoded = 255 * to_encoded(whole / 255)
+    return np.clip(np.rint(encoded + rng.normal(0, noise, whole.shape)), 0, 255).astype(np.uint8)
 
 
 def _seen(camera: Camera, board: Board, cam_from_board: RigidTransform) -> tuple[Single, Single]:

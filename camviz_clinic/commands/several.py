@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from camviz_clinic.commands.boards import add_board, board_of
 from camviz_clinic.commands.common import Parser, Refusal
 from camviz_clinic.commands.rig import held_of, models_of, pm
+from camviz_clinic.commands.rolling import is_rolling
 
 if TYPE_CHECKING:
     from camviz.poses import RigidTransform
@@ -63,7 +64,7 @@ def refuse_beside_boards(options: argparse.Namespace) -> None:
         "--square-mm": options.square_mm,
         "--right": options.right,
         "--corners": options.corners,
-        "--rolling-shutter": options.rolling_shutter,
+        "--rolling-shutter": is_rolling(options),
         "--board-warp on": options.board_warp == "on",
     }
     given = [word for word, value in others.items() if value]
@@ -110,8 +111,7 @@ def several_of_pictures(
 
     from camviz_clinic.calibration import CannotCalibrate
     from camviz_clinic.calibration.detection import NoBoard
-    from camviz_clinic.rigs import synchronised
-    from camviz_clinic.rigs.boards import calibrate_boards
+    from camviz_clinic.rigs import calibrate_boards, synchronised
 
     models, held = models_of(cameras, options), held_of(cameras, options)
     frames = synchronised(cameras) if len(cameras) > 1 else {name: range(len(paths)) for name, paths in cameras.items()}
@@ -208,7 +208,7 @@ def _list(group: Sequence[str]) -> str:
 
 def _board(where: str, words: str) -> Board:
     """The board of these options."""
-    parser = Parser(prog="camviz board", add_help=False)
+    parser = Parser(prog="camviz board", add_help=False, allow_abbrev=False)
     add_board(parser, required=False, default=False)
     try:
         options, unknown = parser.parse_known_args(shlex.split(words))

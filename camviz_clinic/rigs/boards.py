@@ -13,8 +13,8 @@ from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.detection import CannotCalibrate, Detections, seen
-from camviz_clinic.calibration.types import Board, Calibration
-from camviz_clinic.rigs.graph import cross
+from camviz_clinic.calibration.types import Board, Calibration, Mask
+from camviz_clinic.rigs.graph import Indices, cross
 from camviz_clinic.rigs.places import RelativePose
 from camviz_clinic.rigs.rejection import sentences
 from camviz_clinic.rigs.solving import FORMAT, judged, settled
@@ -39,8 +39,8 @@ class SolvedBoards:
 
     adjustment: TargetAdjustment
     groups: tuple[tuple[str, ...], ...]
-    frames: Array
-    of_group: Array
+    frames: Indices
+    of_group: Indices
     pictures: Mapping[str, Mapping[int, str]]
     sizes: Mapping[str, tuple[float, float]]
 
@@ -248,7 +248,7 @@ def _groups(names: Sequence[str], apart: Sequence[Sequence[str]]) -> tuple[tuple
     return tuple(sorted((group for group in groups if group), key=lambda group: list(names).index(group[0])))
 
 
-def _rms(squares: Array, used: Array) -> Array:
+def _rms(squares: Array, used: Mask) -> Array:
     """RMS (views,) in pixels over the corners in use; NaN in a view without one."""
     count = used.sum(axis=1)
     return np.sqrt(np.sum(squares, axis=1, where=used) / np.where(count, count, np.nan))

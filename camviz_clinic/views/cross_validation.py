@@ -65,6 +65,8 @@ class CrossValidationView(View):
             held = held_out(adjustment, camera=name)
         except (ValueError, np.linalg.LinAlgError) as error:
             raise Missing(f"There can be no cross-validation: {error}.") from error
+        if not np.isfinite(held.variances).any():
+            raise Missing("There can be no cross-validation: half a board of so few corners gives no pose.")
         squares = np.where(adjustment.used[name], np.sum(adjustment.residuals[name] ** 2, axis=-1), np.nan)
         with np.errstate(invalid="ignore"):
             fitted = np.sqrt(np.nansum(squares, axis=1) / np.maximum(np.isfinite(squares).sum(axis=1), 1))

@@ -21,7 +21,7 @@ from camviz_clinic.calibration import calibrate, calibrate_pair, detect
 from camviz_clinic.calibration.paper import as_printed
 from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.checks.rig import lone_poses
-from camviz_clinic.checks.snapshots import snapshot
+from camviz_clinic.checks.snapshots import snapshot, together
 from camviz_clinic.checks.virtual import spread_boards
 from camviz_clinic.files.writing import write as write_calibration
 from camviz_clinic.films.virtual import SmoothTake, take, write_film
@@ -66,7 +66,7 @@ cam0:
 
 
 def write(folder: Path) -> None:
-    """left/, right/, later/, knocked/, rig/ and phone/ show a board, two files are solved from them."""
+    """left/, right/, later/, knocked/, rig/ and phone/ show a board, wall/ several, two files are solved from them."""
     rng = np.random.default_rng(18)
     together, later = (spread_boards(rng, seen_by, BOARD, VIEWS, (15, 40)) for seen_by in ((LEFT, RIGHT), (KNOCKED,)))
     shoot(folder / "left", LEFT, together, rng)
@@ -83,6 +83,7 @@ def write(folder: Path) -> None:
     cv2.imwrite(str(folder / "around.png"), around[..., ::-1])
     expose(folder / "frames", rng)
     shoot_rig(folder / "rig")
+    shoot_wall(folder / "wall")
     own = np.random.default_rng(20)
     shoot(folder / "phone", LEFT, spread_boards(own, (LEFT,), SHEET, 10, (15, 40)), own, SHEET)
     robot(folder)
@@ -111,6 +112,30 @@ def shoot_rig(folder: Path) -> None:
                 camera, truth.board, camera.cam_from_world * truth.world_from_board[int(frame)], rng, NOISE
             )
             cv2.imwrite(str(folder / name / f"{frame:02}.png"), image)
+
+
+def shoot_wall(folder: Path) -> None:
+    """Two cameras before four loose markers on a wall."""
+    rng = np.random.default_rng(4)
+    turns = Rotation.from_rotvec([[0, 0, 0], [0.1, 0.3, 0.05], [-0.2, 0.1, 0.1], [0.2, -0.2, 0]])
+    at = [[0, 0, 0], [0.42, 0.02, 0.05], [0.02, 0.4, -0.04], [0.41, 0.42, 0.02]]
+    places, middle = RigidTransform.from_components(at, turns), RigidTransform.from_translation([-0.26, -0.26, 0])
+    markers = [Board.marker_grid(1, 1, 0.12, "DICT_4X4_50", first_id=number) for number in range(4)]
+    beside = RigidTransform.from_components([0.25, 0.01, 0.02], Rotation.from_rotvec([0.02, -0.15, 0.01]))
+    cameras = {"cam0": LEFT, "cam1": RIGHT.at(beside)}
+    for name in cameras:
+        (folder / name).mkdir(parents=True)
+    for frame in range(10):
+        turn = Rotation.from_rotvec([*rng.normal(0, 0.35, 2), rng.normal(0, 0.2)])
+        away = [*rng.normal(0, 0.06, 2) + [0.1, 0], rng.uniform(1.1, 1.5)]
+        wall = RigidTransform.from_components(away, turn) * middle
+        for name, camera in cameras.items():
+            image = together(camera, markers, camera.cam_from_world * wall * places, rng)
+            cv2.imwrite(str(folder / name / f"{frame:02}.png"), image)
+    names = ("door", "shelf", "lamp", "desk")
+    words = "--markers 4X4_50 --board 1x1 --square-mm 120 --first-id"
+    lines = [f'{name} = "{words} {number}"\n' for number, name in enumerate(names)]
+    (folder.parent / "wall.toml").write_text("".join(lines), encoding="utf-8")
 
 
 def robot(folder: Path) -> None:
