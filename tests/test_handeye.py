@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from camviz.poses import RigidTransform, Rotation
+from camviz_clinic.calibration.motions import Motions, Turning
+from camviz_clinic.calibration.motions_solving import park
 from camviz_clinic.checks.rig import lone_poses
 from camviz_clinic.handeye import PoseError, hand_eye, hand_eye_from_corners
 from camviz_clinic.handeye.adjusting import STRAY, Adjusted, Pixels, far_off
-from camviz_clinic.handeye.linear import park
-from camviz_clinic.handeye.motion import Motions, Turning
 from camviz_clinic.handeye.solving import corner_noise
 from camviz_clinic.handeye.virtual import about_one_axis, cell, strayed
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from camviz.poses import RigidTransform, Rotation
+from camviz_clinic.calibration.motions import Turning
 from camviz_clinic.handeye import PoseError, RobotPoses
 from camviz_clinic.handeye.diagnosis import DISAGREE, KINDS, LITTLE_DEG, PosedPictures, turning_finding
 from camviz_clinic.handeye.mends import FEWEST_TRIED
-from camviz_clinic.handeye.motion import Turning
 from camviz_clinic.handeye.virtual import FAULTS, about_one_axis, cell, healthy_case, moving, scaled, strayed
 
 

@@ -13,8 +13,6 @@ from typing import TYPE_CHECKING, Any
 from camviz.lenses import calibration_models
 from camviz_clinic.commands.boards import add_board, board_of
 from camviz_clinic.commands.common import (
-    FOUND,
-    OK,
     Refusal,
     add_command,
     add_megapixels,
@@ -22,16 +20,14 @@ from camviz_clinic.commands.common import (
     millimetres,
     narrator,
     pixels,
-    refuse_exhausted,
     refuse_output,
     size,
-    write_calibration,
-    write_whole,
 )
 from camviz_clinic.commands.corners import add_corners, corners_of
 from camviz_clinic.commands.films import FILMS, add_frames, as_pictures
 from camviz_clinic.commands.gate import EPILOG as GATE
-from camviz_clinic.commands.gate import add_gate, given_gate, refuse_junit, write_junit
+from camviz_clinic.commands.gate import add_gate, given_gate, refuse_junit
+from camviz_clinic.commands.outcome import judged, stamped, written
 from camviz_clinic.commands.pictures import Bar, pictures
 from camviz_clinic.commands.rig import (
     RIG,
@@ -44,21 +40,11 @@ from camviz_clinic.commands.rig import (
     usual_name,
 )
 from camviz_clinic.commands.rolling import ROLLING, add_rolling, calibrate_rolling, is_rolling
-from camviz_clinic.commands.several import (
-    BOARDS,
-    add_boards,
-    places_toml,
-    read_boards,
-    refuse_beside_boards,
-    several_of_pictures,
-    told_of,
-)
+from camviz_clinic.commands.several import BOARDS, add_boards, calibrate_several, refuse_beside_boards
 from camviz_clinic.commands.telling import report, worth
 
 if TYPE_CHECKING:
     from camviz_clinic.calibration import CannotCalibrate, Detections
-    from camviz_clinic.checks import Inspection
-    from camviz_clinic.checks.gate import Gate
     from camviz_clinic.files import Board, Calibration
     from camviz_clinic.files.corners import LoadedCorners
 
@@ -200,14 +186,15 @@ def _of_stills(options: argparse.Namespace, of_films: tuple[str, ...]) -> int:
     given = list(cameras.values()) if not options.corners else [left or options.corners, right]
     folders = dict(zip(cameras, (each[0].parent for each in given if each), strict=False))
     if options.boards:
-        return _of_boards(cameras, folders, options, form, gate)
+        look = partial(_looked, options=options)
+        return calibrate_several(cameras, folders, options, form, gate, look, _how(options))
     try:
         calibration = _of_corners(left, right, options) if options.corners else _of_pictures(cameras, options)
     except CannotCalibrate as error:
         raise Refusal(_complaint(error, shots, options)) from error
     calibration = replace(calibration, notes=(*of_films, *calibration.notes))
-    calibration = _stamped(calibration, calibration, list(cameras.values()), options)
-    left_out = _written(calibration, options, form)
+    calibration = stamped(calibration, calibration, list(cameras.values()), options)
+    left_out = written(calibration, options, form)
     calibration = replace(calibration, source=options.output)
     told = narrator(options.output)
     for sentence in [*report(calibration), *(placed(calibration) if options.rig else [])]:
@@ -217,60 +204,7 @@ def _of_stills(options: argparse.Namespace, of_films: tuple[str, ...]) -> int:
     if doctored := "" if options.rig or is_rolling(options) else _prescribed(shots, options, calibration):
         told(f"Is the board as described? {doctored}")
     told(f"{options.output}: written.{left_out}")
-    return _judged(calibration, dict(zip(calibration.cameras, folders.values(), strict=True)), options, gate)
-
-
-def _of_boards(
-    cameras: Mapping[str, list[Path]], folders: Mapping[str, Path], options: argparse.Namespace, form: str, gate: Gate
-) -> int:
-    """The same where several boards are in the pictures; what is inspected is what the largest of them shows."""
-    from camviz_clinic.calibration import CannotCalibrate
-
-    file = read_boards(options.boards)
-    try:
-        solved = several_of_pictures(cameras, file, options, partial(_looked, options=options), _how(options))
-    except CannotCalibrate as error:
-        raise Refusal(f"{error}.") from error
-    inspected = solved.through(solved.largest)
-    calibration = _stamped(solved.calibration, inspected, list(cameras.values()), options)
-    left_out, told = _written(calibration, options, form), narrator(options.output)
-    for sentence in [*told_of(solved, file), *calibration.notes]:
-        told(sentence)
-    told(f"{options.output}: written.{left_out}")
-    if options.places:
-        write_whole(options.places, lambda path: path.write_text(places_toml(solved, file), encoding="utf-8"))
-        told(f"{options.places}: written; --boards reads it.")
-    inspected = replace(inspected, stamps=calibration.stamps, source=options.output)
-    return _judged(inspected, folders, options, gate)
-
-
-def _written(calibration: Calibration, options: argparse.Namespace, form: str) -> str:
-    """Writes it; what the format could not hold, in sentences after a space."""
-    from camviz_clinic.files import CalibrationError
-
-    try:
-        return "".join(f" {sentence}" for sentence in write_calibration(calibration, options.output, form))
-    except CalibrationError as error:
-        raise Refusal(str(error)) from error
-    except OSError as error:
-        refuse_exhausted(error)
-        raise Refusal(f"{options.output}: cannot be written ({error.strerror or error}).") from error
-
-
-def _judged(calibration: Calibration, folders: Mapping[str, Path], options: argparse.Namespace, gate: Gate) -> int:
-    """Inspects it and writes the page, where that is asked for; the exit status."""
-    from camviz_clinic.checks import inspect
-
-    decides = gate.asked or options.junit is not None
-    if not (options.report or decides):
-        return OK
-    outcome, told = gate.judge(inspect(calibration)), narrator(options.output)
-    told("\n".join(["", outcome.inspection.as_text(), *outcome.lines()]))
-    if options.report:
-        _page(outcome.inspection, folders, options.report)
-        told(f"{options.report}: open it in a browser.")
-    write_junit(options, {str(options.output): outcome})
-    return OK if outcome.passed or not decides else FOUND
+    return judged(calibration, dict(zip(calibration.cameras, folders.values(), strict=True)), options, gate)
 
 
 def _refuse_words(options: argparse.Namespace) -> None:
@@ -335,31 +269,6 @@ def _of_pictures(cameras: Mapping[str, list[Path]], options: argparse.Namespace)
     return _pair(left, right, board, options) if right else _single(left, board, options)
 
 
-def _stamped(
-    calibration: Calibration, seen: Calibration, shots: list[list[Path]], options: argparse.Namespace
-) -> Calibration:
-    """With what the calibration of each camera holds for; and a note where the setting changed between its pictures.
-
-    `seen` is the calibration with its views.
-    """
-    from camviz import __version__
-    from camviz_clinic.calibration.stamp import Stamp, now
-    from camviz_clinic.checks.stamps import settings_differ
-
-    made = {"made": now(), "program": f"camviz {__version__}", "model": options.model, "conditions": options.conditions}
-    models = dict(word.split("=", 1) for word in options.model_of)
-    stamps = {
-        name: Stamp.of(
-            pictures,
-            views=int(seen.used(name).any(axis=1).sum()),
-            **made | {"model": models.get(name, options.model)},
-        )
-        for name, pictures in zip(calibration.cameras, shots, strict=False)
-    }
-    notes = [f"{name}: {said}" for name, stamp in stamps.items() for said in settings_differ(stamp)]
-    return replace(calibration, stamps=stamps, notes=(*calibration.notes, *notes))
-
-
 def _complaint(error: CannotCalibrate, paths: list[Path], options: argparse.Namespace) -> str:
     """Why there is no calibration; and what of the board is not as described, in place of a guess at what it is."""
     from camviz_clinic.calibration.detection import NoBoard
@@ -378,12 +287,6 @@ def _prescribed(paths: list[Path], options: argparse.Namespace, calibration: Cal
     shown = Shown.of(paths, board_of(options))
     baseline = None if options.baseline_mm is None else options.baseline_mm / 1000
     return prescription(diagnose(replace(shown, calibration=calibration, baseline=baseline)))
-
-
-def _page(inspection: Inspection, folders: Mapping[str, Path], page: Path) -> None:
-    from camviz_clinic.report.inspection import write_report
-
-    write_whole(page, lambda path: write_report(inspection, path, images=folders))
 
 
 def _single(paths: list[Path], board: Board, options: argparse.Namespace) -> Calibration:

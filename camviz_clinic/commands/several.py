@@ -5,12 +5,13 @@ from __future__ import annotations
 import argparse
 import shlex
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from camviz_clinic.commands.boards import add_board, board_of
-from camviz_clinic.commands.common import Parser, Refusal
+from camviz_clinic.commands.common import Parser, Refusal, narrator, write_whole
+from camviz_clinic.commands.outcome import judged, stamped, written
 from camviz_clinic.commands.rig import held_of, models_of, pm
 from camviz_clinic.commands.rolling import is_rolling
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from camviz.poses import RigidTransform
     from camviz_clinic.calibration.detection import Detections
     from camviz_clinic.calibration.types import Board
+    from camviz_clinic.checks.gate import Gate
     from camviz_clinic.rigs.boards import SolvedBoards
 
 BOARDS = """\
@@ -87,9 +89,7 @@ def read_boards(path: Path) -> BoardsFile:
     for name, said in tree.items():
         said = said if isinstance(said, Mapping) else {"board": said}
         if not isinstance(said.get("board"), str) or set(said) - {"board", "place"}:
-            raise Refusal(
-                f'{path}: {name}: expected a board\'s options in quotes, such as "--board 9x6 --square-mm 30".'
-            )
+            raise Refusal(f'{path}: {name}: expected options in quotes, such as "--board 9x6 --square-mm 30".')
         words[name] = said["board"]
         boards[name] = _board(f"{path}: {name}", said["board"])
         if "place" in said:
@@ -97,6 +97,36 @@ def read_boards(path: Path) -> BoardsFile:
     if len(boards) < 2:
         raise Refusal(f"{path}: expected at least two boards, got {len(boards)}.")
     return BoardsFile(boards, words, _apart(path, apart, boards), known)
+
+
+def calibrate_several(
+    cameras: Mapping[str, list[Path]],
+    folders: Mapping[str, Path],
+    options: argparse.Namespace,
+    form: str,
+    gate: Gate,
+    look: Callable[[list[Path], Board], Detections],
+    how: Mapping[str, Any],
+) -> int:
+    """Solve, write and tell; what is inspected is what the largest board shows."""
+    from camviz_clinic.calibration import CannotCalibrate
+
+    file = read_boards(options.boards)
+    try:
+        solved = several_of_pictures(cameras, file, options, look, how)
+    except CannotCalibrate as error:
+        raise Refusal(f"{error}.") from error
+    inspected = solved.through(solved.largest)
+    calibration = stamped(solved.calibration, inspected, list(cameras.values()), options)
+    left_out, told = written(calibration, options, form), narrator(options.output)
+    for sentence in [*told_of(solved, file), *calibration.notes]:
+        told(sentence)
+    told(f"{options.output}: written.{left_out}")
+    if options.places:
+        write_whole(options.places, lambda path: path.write_text(places_toml(solved, file), encoding="utf-8"))
+        told(f"{options.places}: written; --boards reads it.")
+    inspected = replace(inspected, stamps=calibration.stamps, source=options.output)
+    return judged(inspected, folders, options, gate)
 
 
 def several_of_pictures(
@@ -107,8 +137,6 @@ def several_of_pictures(
     how: Mapping[str, Any],
 ) -> SolvedBoards:
     """Detected, paired and solved for; raises CannotCalibrate and Refusal."""
-    from dataclasses import replace
-
     from camviz_clinic.calibration import CannotCalibrate
     from camviz_clinic.calibration.detection import NoBoard
     from camviz_clinic.rigs import calibrate_boards, synchronised

@@ -16,7 +16,7 @@ from camviz_clinic.calibration.adjustment import twisted
 from camviz_clinic.calibration.arrowhead import inverse
 from camviz_clinic.calibration.clustered import ByView
 from camviz_clinic.calibration.jacobian import pixel_jacobian, twist_jacobian
-from camviz_clinic.handeye.motion import Mask, Motions
+from camviz_clinic.calibration.motions import Mask, Motions
 
 MOST_STEPS = 60
 SETTLED = 1e-12  # of the sum of squares, what a step must still promise to take off

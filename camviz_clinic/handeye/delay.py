@@ -10,10 +10,10 @@ from scipy.spatial.transform import RotationSpline
 
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
+from camviz_clinic.calibration.motions import FEWEST, Motions
+from camviz_clinic.calibration.motions_solving import start
 from camviz_clinic.handeye.adjusting import Adjusted, robust
-from camviz_clinic.handeye.linear import start
 from camviz_clinic.handeye.mends import Indices
-from camviz_clinic.handeye.motion import FEWEST, Motions
 
 SURE = 4.0  # σ: what a delay must be away from zero
 BETTER = 1.25  # times: what it must take off the poses' errors

@@ -11,6 +11,7 @@ import numpy as np
 from camviz.cameras import Camera
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
+from camviz_clinic.calibration.motions import FEWEST, PoseError, Turning
 from camviz_clinic.calibration.problem import LEAST_CORNERS
 from camviz_clinic.calibration.types import Board
 from camviz_clinic.checks.registry import SEVERITIES, Finding
@@ -19,10 +20,8 @@ from camviz_clinic.handeye import mends
 from camviz_clinic.handeye.adjusting import far_off
 from camviz_clinic.handeye.delay import Delay, delay
 from camviz_clinic.handeye.mends import FEWEST_TRIED, UNITS, Indices, Tried, exchanged
-from camviz_clinic.handeye.motion import FEWEST, Turning
 from camviz_clinic.handeye.pose_table import RobotPoses
 from camviz_clinic.handeye.solving import HandEye, hand_eye_from_corners
-from camviz_clinic.handeye.turn_forms import PoseError
 
 LITTLE_DEG = 10.0  # turned less about every second axis, X's translation is known badly
 SURE = 4.0  # σ: what a scale must be away from 1

@@ -11,9 +11,9 @@ from scipy.optimize import linear_sum_assignment
 
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
+from camviz_clinic.calibration.motions import Motions, angles
+from camviz_clinic.calibration.motions_solving import start
 from camviz_clinic.handeye.adjusting import Adjusted, far_off, robust
-from camviz_clinic.handeye.linear import start
-from camviz_clinic.handeye.motion import Motions, angles
 
 MUCH_BETTER = 3.0  # times: what another reading must take off the poses' errors
 ALIKE = 1.1  # times the least error: of readings so near to it the one that fits most poses is named

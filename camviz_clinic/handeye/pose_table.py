@@ -13,10 +13,11 @@ import numpy as np
 
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
+from camviz_clinic.calibration.motions import PoseError
 from camviz_clinic.calibration.types import CalibrationError
 from camviz_clinic.files.text import read_bytes, text_of
 from camviz_clinic.handeye import turn_forms
-from camviz_clinic.handeye.turn_forms import FULL_TURN, PoseError
+from camviz_clinic.handeye.turn_forms import FULL_TURN
 
 REACH_M = 20.0  # no robot on a base reaches further: larger numbers are millimetres
 MOST_ROWS = 10_000

@@ -12,13 +12,12 @@ from camviz.cameras import Camera
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.jacobian import twist_jacobian
+from camviz_clinic.calibration.motions import FEWEST, Mask, Motions, PoseError
+from camviz_clinic.calibration.motions_solving import start
 from camviz_clinic.calibration.problem import LEAST_CORNERS
 from camviz_clinic.calibration.types import Board
 from camviz_clinic.checks.rig import lone_poses
 from camviz_clinic.handeye.adjusting import Adjusted, Noise, Pixels, far_off, robust
-from camviz_clinic.handeye.linear import start
-from camviz_clinic.handeye.motion import FEWEST, Mask, Motions
-from camviz_clinic.handeye.turn_forms import PoseError
 
 MOST_STRAY = 0.2  # of the poses
 UNKNOWN_DEG = 1.0  # turned less about every second axis, a direction of X's translation is not known

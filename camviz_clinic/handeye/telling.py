@@ -8,10 +8,10 @@ import numpy as np
 
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
+from camviz_clinic.calibration.motions import Mask
 from camviz_clinic.checks import words
 from camviz_clinic.files.output import as_rows
 from camviz_clinic.handeye.diagnosis import PosedPictures
-from camviz_clinic.handeye.motion import Mask
 from camviz_clinic.handeye.solving import HandEye
 
 ARRANGEMENTS = ("eye in hand", "eye to hand")

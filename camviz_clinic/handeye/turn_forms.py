@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from camviz.lenses.base import Array
 from camviz.poses import Rotation
+from camviz_clinic.calibration.motions import PoseError
 
 FORMS = ("matrix", "xyzw", "wxyz", "rotvec", "euler-ORDER")
 EULER = re.compile(r"euler-(xyz|xzy|yxz|yzx|zxy|zyx|XYZ|XZY|YXZ|YZX|ZXY|ZYX)")
@@ -18,16 +19,6 @@ QUATERNIONS = ("xyzw", "wxyz")
 COUNTS = {"matrix": 9, "xyzw": 4, "wxyz": 4, "rotvec": 3}
 ROUNDED = 0.02  # how far a quaternion's length, or a product of a matrix's columns, may be off by rounding
 FULL_TURN = 2 * np.pi + 0.01  # no angle in radians is larger; 0.01 for rounding
-
-
-class PoseError(ValueError):
-    """Robot poses that cannot be read, or from which nothing can be solved; the message is one sentence.
-
-    >>> from camviz_clinic.handeye import read_poses
-    >>> read_poses("none.csv")
-    Traceback (most recent call last):
-    camviz_clinic.handeye.turn_forms.PoseError: none.csv: there is no such file
-    """
 
 
 def count(form: str) -> int:

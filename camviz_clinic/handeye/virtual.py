@@ -14,9 +14,9 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
+from camviz_clinic.calibration.motions import Turning
 from camviz_clinic.calibration.types import Board
 from camviz_clinic.handeye.diagnosis import PosedPictures
-from camviz_clinic.handeye.motion import Turning
 from camviz_clinic.handeye.pose_table import RobotPoses
 from camviz_clinic.handeye.turn_forms import other_readings, rotations
 

@@ -16,9 +16,9 @@ import numpy as np
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.detection import CannotCalibrate
+from camviz_clinic.calibration.motions import Motions
+from camviz_clinic.calibration.motions_solving import start
 from camviz_clinic.calibration.types import Mask
-from camviz_clinic.handeye.linear import start
-from camviz_clinic.handeye.motion import Motions
 from camviz_clinic.rigs.graph import listed, middlemost, parted
 
 FEWEST_MOTIONS = 6  # frames

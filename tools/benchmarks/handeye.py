@@ -12,8 +12,8 @@ from collections import Counter
 
 import numpy as np
 
+from camviz_clinic.calibration.motions_solving import park
 from camviz_clinic.handeye import hand_eye_from_corners
-from camviz_clinic.handeye.linear import park
 from camviz_clinic.handeye.virtual import FAULTS, cell, healthy_case
 
 CASES, SEED, POSES, NOTHING = 50, 70_000, (8, 15, 25), "nothing"

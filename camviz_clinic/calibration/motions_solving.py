@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from camviz.lenses.base import Array
 from camviz.poses import Rotation
-from camviz_clinic.handeye.motion import Motions
+from camviz_clinic.calibration.motions import Motions
 
 Indices = NDArray[np.intp]
 

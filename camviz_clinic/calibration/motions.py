@@ -11,11 +11,20 @@ from numpy.typing import NDArray
 
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
-from camviz_clinic.handeye.turn_forms import PoseError
 
 FEWEST = 3  # poses: two motions
 
 Mask = NDArray[np.bool_]
+
+
+class PoseError(ValueError):
+    """Robot poses that cannot be read, or from which nothing can be solved; the message is one sentence.
+
+    >>> from camviz_clinic.handeye import read_poses
+    >>> read_poses("none.csv")
+    Traceback (most recent call last):
+    camviz_clinic.calibration.motions.PoseError: none.csv: there is no such file
+    """
 
 
 @dataclass(frozen=True, eq=False)
