@@ -32,9 +32,17 @@ class SolvedBoards:
     Args:
         adjustment: The solution. Its views are the frames of each group of boards that are fixed to each other.
         groups: The boards' names by group; all are in the frame of the first of their group.
-        frames: (views,), the frame of each view, and `of_group` (views,) its group.
+        frames: (views,), the frame of each view.
+        of_group: (views,), the number of the group that each view shows.
         pictures: By camera, the names of its pictures by their frames.
         sizes: By board, how many times larger it is than said beside the board that most corners are of, and σ of it.
+
+    >>> from camviz_clinic.rigs import virtual_boards
+    >>> rng = np.random.default_rng(0)
+    >>> truth = virtual_boards.back_to_back(rng)
+    >>> found = calibrate_boards(truth.observed(rng), truth.boards)
+    >>> found.largest, found.place("behind").seen_from
+    ('ahead', 'ahead')
     """
 
     adjustment: TargetAdjustment
@@ -163,6 +171,14 @@ def calibrate_boards(
 
     Source: Triggs, McLauchlan, Hartley & Fitzgibbon (2000), "Bundle adjustment: a modern synthesis"; for cameras that
         see no board together Park & Martin (1994), "Robot sensor calibration".
+
+    >>> from camviz_clinic.rigs import virtual_boards
+    >>> rng = np.random.default_rng(0)
+    >>> truth = virtual_boards.parting(rng)
+    >>> found = calibrate_boards(truth.observed(rng), truth.boards, apart=[["one"]])
+    >>> off = found.adjustment.cameras["cam2"].centre - truth.cameras["cam2"].centre
+    >>> found.groups, bool(np.linalg.norm(off) < 0.003)
+    ((('one',), ('other',)), True)
     """
     names = _seen_boards(detections, boards, [*(name for group in apart for name in group), *(known or {})])
     groups = _groups(names, apart)
