@@ -228,7 +228,7 @@ class VanishingView(View):
         else:
             content += svg.text(panel.place((0, 500)), "f is not known here", "label middle")
         shown = panel.show(content, title="From above")
-        return shown + svg.text((x + 14, panel.y + panel.height + 17), "black: the picture; colours: the walls", "note")
+        return shown + svg.text((x + 14, panel.y + panel.height + 17), "across: picture; colours: walls", "note")
 
     def _numbers_column(self, cell: Cell) -> str:
         x, y, _, _ = cell
