@@ -9,7 +9,7 @@ import pytest
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady
 from camviz.poses import RigidTransform, Rotation
-from camviz_clinic.calibration import Board, Detections, calibrate, chessboards, find_corners
+from camviz_clinic.calibration import Board, Detections, calibrate, chessboards, detect, find_corners
 from camviz_clinic.calibration.boards import kinds, markers
 from camviz_clinic.calibration.boards.picture import whiteness
 from camviz_clinic.calibration.chessboards import everywhere
@@ -245,6 +245,11 @@ def test_views_draw_what_is_printed(kind):
 def test_a_board_that_cannot_be_is_refused(fields, said):
     with pytest.raises(ValueError, match=said):
         Board(*fields)
+
+
+def test_a_grid_with_more_markers_than_its_dictionary_is_not_looked_for():
+    with pytest.raises(ValueError, match="dictionary must have the 51 markers of this board, DICT_4X4_50 has 50"):
+        detect(["none.png"], Board.marker_grid(1, 1, 0.06, "DICT_4X4_50", first_id=50))
 
 
 def test_a_chessboard_with_a_short_side_is_not_looked_for():

@@ -89,6 +89,7 @@ def test_a_board_that_does_not_fit_is_refused_with_what_would():
         (["--square-mm", "-3"], "expected a length in millimetres"),
         (["--charuco", "5X5_7"], "dictionary must be one of DICT_4X4_100"),
         (["--board", "30x30", "--square-mm", "5", "--charuco", "4X4_50"], "must have the 480 markers"),
+        (["--board", "8x8", "--square-mm", "5", "--markers", "4X4_50"], "must have the 64 markers of this board"),
         (["--marker-mm", "10"], "--marker-mm is for a ChArUco board"),
         (["--charuco", "4X4_50", "--marker-mm", "30"], "marker_size must be a length below square_size"),
         (["-o", "gone/board.pdf"], "there is no directory gone"),

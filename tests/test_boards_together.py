@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from camviz_clinic.calibration import CannotCalibrate
+from camviz_clinic.commands.several import size_sentence
 from camviz_clinic.rigs import calibrate_boards, relative_pose, virtual_boards
 
 SCENES = {
@@ -48,6 +49,7 @@ def test_cameras_and_boards_are_where_they_are_within_three_deviations(scene, th
         off += [errors(*each) for each in beside(truth, found)]
         assert found.calibration.notes == ()
         assert abs(found.adjustment.sigma - truth.noise) < 0.01
+        assert not any(size_sentence(name, *size) for name, size in found.sizes.items())
     off = np.concatenate(off)
     assert (np.abs(off) < 3).mean() >= 0.99
     assert np.sqrt(np.mean(off**2)) < 1.3
@@ -83,7 +85,7 @@ def test_a_board_that_was_printed_in_another_size_is_measured(factor):
     found = calibrate_boards(truth.observed(rng), truth.boards)
     size, sigma = found.sizes["back"]
     assert abs(size - factor) < 3 * sigma
-    assert abs(size - 1) > 4 * sigma
+    assert size_sentence("back", size, sigma)
 
 
 def test_a_known_place_is_kept_and_makes_the_cameras_better():

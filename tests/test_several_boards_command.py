@@ -12,7 +12,7 @@ from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.types import Board
 from camviz_clinic.checks.snapshots import together
 from camviz_clinic.commands.command import main
-from camviz_clinic.commands.several import read_boards
+from camviz_clinic.commands.several import read_boards, size_sentence
 from camviz_clinic.files import load
 
 NAMES = ("door", "shelf", "lamp", "desk")
@@ -125,3 +125,19 @@ def test_what_cannot_be_is_refused_in_one_sentence(room, capsys, text, words, wh
 def test_places_are_for_several_boards(room, capsys):
     assert main(["calibrate", "cam0", "--board", "9x6", "--square-mm", "20", "--places", "out.toml"]) == 2
     assert "--places is for several boards: name them with --boards." in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("size", "sigma", "said"),
+    [
+        (1.0041, 0.001, "back is 0.41 ± 0.10 % larger than it is said to be"),
+        (0.9959, 0.001, "back is 0.41 ± 0.10 % smaller than it is said to be"),
+        (1.0039, 0.001, ""),  # less than four of its σ
+        (1.0021, 0.00001, "larger"),
+        (1.0019, 0.00001, ""),  # as good as a printer is
+    ],
+)
+def test_a_size_is_doubted_where_that_is_certain_and_matters(size, sigma, said):
+    sentence = size_sentence("back", size, sigma)
+    assert said in sentence
+    assert bool(sentence) == bool(said)

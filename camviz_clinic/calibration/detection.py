@@ -16,7 +16,8 @@ import numpy as np
 
 from camviz.lenses.base import Array
 from camviz_clinic.calibration.boards import kind_of
-from camviz_clinic.calibration.boards.charuco import charuco_dictionary, marker_dictionary
+from camviz_clinic.calibration.boards.charuco import charuco_dictionary
+from camviz_clinic.calibration.boards.markers import grid_dictionary
 from camviz_clinic.calibration.chessboards import LEAST_SIDE
 from camviz_clinic.calibration.finding import check_finder, find_corners, look
 from camviz_clinic.calibration.processes import WorkerPool, processors, signals_put_off
@@ -215,7 +216,7 @@ def _looked(
     if board.kind == "charuco":
         charuco_dictionary(board)  # complains about a board that cannot be
     elif board.kind == "markers":
-        marker_dictionary(board.dictionary)
+        grid_dictionary(board)
     elif board.kind == "chessboard" and min(board.columns, board.rows) < LEAST_SIDE:
         raise CannotCalibrate(
             f"a chessboard is found by at least {LEAST_SIDE}×{LEAST_SIDE} inner corners, this board has "

@@ -174,14 +174,13 @@ def _board(options: argparse.Namespace) -> Board:
 
 
 def _markers(options: argparse.Namespace, columns: int, rows: int, side: float) -> Board:
-    from camviz_clinic.calibration.boards.charuco import marker_dictionary
+    from camviz_clinic.calibration.boards.markers import grid_dictionary
     from camviz_clinic.calibration.types import Board
 
     if options.legacy:
         raise Refusal("--legacy is for a ChArUco board: name its dictionary with --charuco.")
     name = "DICT_" + options.markers.removeprefix("DICT_")
-    held, needed = len(marker_dictionary(name).bytesList), options.first_id + columns * rows
-    if held < needed:
-        raise Refusal(f"--markers must have the {needed} markers of this grid, {name} has {held}.")
     spacing, bits = options.spacing or SPACING, options.border_bits
-    return Board.marker_grid(columns, rows, side, name, spacing, first_id=options.first_id, border_bits=bits)
+    board = Board.marker_grid(columns, rows, side, name, spacing, first_id=options.first_id, border_bits=bits)
+    grid_dictionary(board)
+    return board

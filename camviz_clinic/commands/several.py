@@ -204,7 +204,7 @@ def told_of(solved: SolvedBoards, file: BoardsFile) -> list[str]:
             )
     for group in solved.groups[1:]:
         said.append(f"{' and '.join(group)} {'moves' if len(group) == 1 else 'move'} apart from {solved.groups[0][0]}.")
-    return said + [sentence for name in solved.sizes if (sentence := _size(solved, name))]
+    return said + [sentence for name, size in solved.sizes.items() if (sentence := size_sentence(name, *size))]
 
 
 def places_toml(solved: SolvedBoards, file: BoardsFile) -> str:
@@ -218,9 +218,8 @@ def places_toml(solved: SolvedBoards, file: BoardsFile) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _size(solved: SolvedBoards, name: str) -> str:
-    """That a board has not the size that is said, where this is certain."""
-    size, sigma = solved.sizes[name]
+def size_sentence(name: str, size: float, sigma: float) -> str:
+    """That a board has not the size that is said, where this is certain and matters; empty otherwise."""
     if not (abs(size - 1) > CERTAIN * sigma and abs(size - 1) > WORTH):
         return ""
     word = "larger" if size > 1 else "smaller"

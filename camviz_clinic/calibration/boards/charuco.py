@@ -71,22 +71,22 @@ def white_squares(shape: Shape) -> list[tuple[int, int]]:
 
 def charuco_dictionary(shape: Shape) -> Any:
     """OpenCV's dictionary of a board's markers; ValueError for one that it does not have or that is too small."""
-    dictionary = marker_dictionary(shape.dictionary)
-    held, needed = len(dictionary.bytesList), shape.first_id + markers(shape)
-    if held < needed:
-        raise ValueError(f"dictionary must have the {needed} markers of this board, {shape.dictionary} has {held}")
-    return dictionary
+    return marker_dictionary(shape.dictionary, shape.first_id + markers(shape))
 
 
 @lru_cache(maxsize=8)
-def marker_dictionary(name: str | None) -> Any:
-    """OpenCV's dictionary of this name; ValueError for one that it does not have."""
+def marker_dictionary(name: str | None, needed: int = 0) -> Any:
+    """OpenCV's dictionary of this name; ValueError for one that it does not have, or that holds fewer than needed."""
     import cv2
 
     names = sorted(name for name in dir(cv2.aruco) if name.startswith("DICT_"))
     if name not in names:
         raise ValueError(f"dictionary must be one of {', '.join(names)}, got {name!r}")
-    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+    held = len(dictionary.bytesList)
+    if held < needed:
+        raise ValueError(f"dictionary must have the {needed} markers of this board, {name} has {held}")
+    return dictionary
 
 
 def drawn(shape: Shape) -> Drawing:

@@ -52,9 +52,15 @@ def find(gray: Gray, shape: Shape, finder: str) -> Array | None:
     return seen.reshape(-1, 2) if np.isfinite(seen).any() else None
 
 
+def grid_dictionary(shape: Shape) -> Any:
+    """OpenCV's dictionary of a grid's markers; ValueError for one that it does not have or that is too small."""
+    across, down = tags(shape)
+    return marker_dictionary(shape.dictionary, shape.first_id + across * down)
+
+
 def cells_of(shape: Shape) -> int:
     """How many cells a marker has along a side, its black border among them."""
-    return int(marker_dictionary(shape.dictionary).markerSize) + 2 * shape.border_bits
+    return int(grid_dictionary(shape).markerSize) + 2 * shape.border_bits
 
 
 def _refined(light: NDArray[np.float32], corners: Array, count: int) -> Array:
@@ -114,7 +120,7 @@ def detector(shape: Shape) -> Any:
 
     parameters = cv2.aruco.DetectorParameters()
     parameters.markerBorderBits = shape.border_bits
-    return cv2.aruco.ArucoDetector(marker_dictionary(shape.dictionary), parameters)
+    return cv2.aruco.ArucoDetector(grid_dictionary(shape), parameters)
 
 
 def area(shape: Shape) -> Area:
@@ -128,7 +134,7 @@ def drawn(shape: Shape) -> Drawing:
     """The black cells of the markers."""
     import cv2
 
-    (across, down), dictionary = tags(shape), marker_dictionary(shape.dictionary)
+    (across, down), dictionary = tags(shape), grid_dictionary(shape)
     count, black = dictionary.markerSize + 2 * shape.border_bits, []
     for place in range(across * down):
         image = cv2.aruco.generateImageMarker(dictionary, shape.first_id + place, count, borderBits=shape.border_bits)
