@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from camviz_clinic.calibration import CannotCalibrate
+from camviz_clinic.calibration.adjustment import twisted
 from camviz_clinic.commands.several import size_sentence
 from camviz_clinic.rigs import calibrate_boards, relative_pose, virtual_boards
 
@@ -97,19 +98,21 @@ def test_a_known_place_is_kept_and_makes_the_cameras_better():
     assert either[1] < either[0]
 
 
-def test_a_marker_that_is_taken_for_another_is_set_aside_and_the_rest_stays():
+@pytest.mark.parametrize("name", ["marker0", "marker1"])
+def test_a_marker_that_is_taken_for_another_is_set_aside_and_the_rest_stays(name):
     rng = np.random.default_rng(5)
     truth = virtual_boards.markers(rng)
     seen = truth.observed(rng)
-    one, other = seen["cam0"]["marker1"], seen["cam0"]["marker2"]
+    one, other = seen["cam0"][name], seen["cam0"]["marker2"]
     common = sorted(set(one.places) & set(other.places))[0]
     corners = one.corners.copy()
     corners[one.places.index(common)] = other.corners[other.places.index(common)]
-    seen["cam0"]["marker1"] = replace(one, corners=corners)
+    seen["cam0"][name] = replace(one, corners=corners)
     found = calibrate_boards(seen, truth.boards)
     off = np.concatenate([errors(*each) for each in beside(truth, found)])
     assert np.abs(off).max() < 4.5
-    assert found.through("marker1").set_aside["cam0"].sum() == 4
+    assert sum(found.through(each).set_aside["cam0"].sum() for each in truth.boards) == 4
+    assert found.through(name).set_aside["cam0"].sum() == 4
 
 
 def test_the_equations_are_those_of_finite_differences():
@@ -123,6 +126,15 @@ def test_the_equations_are_those_of_finite_differences():
             ends = [adjustment._moved(way * step, np.zeros((int(adjustment.posed.sum()), 6))) for way in (1, -1)]
             slope = (ends[0].sum_of_squares - ends[1].sum_of_squares) / 2e-6
             assert slope == pytest.approx(-2 * normal.shared_gradient[i], rel=1e-4, abs=0.05), (part, i)
+
+
+def test_the_deviation_of_a_place_is_that_of_its_first_corner():
+    _, found = solved("two-sided", 1)
+    place, pose = found.adjustment.place_of_part(1), found.boards["back"]
+    steps = 1e-6 * np.eye(6)
+    slope = np.array([twisted(pose, step).translation - pose.translation for step in steps]).T / 1e-6
+    expected = slope @ found.adjustment.covariance[place, place] @ slope.T
+    assert np.allclose(found.place("back").covariance[3:, 3:], expected, rtol=1e-3, atol=1e-16)
 
 
 def test_what_cannot_be_solved_is_refused_in_one_sentence():

@@ -22,9 +22,7 @@ from camviz_clinic.calibration.types import Mask
 from camviz_clinic.rigs.graph import listed, middlemost, parted
 
 FEWEST_MOTIONS = 6  # frames
-ONE_AXIS_DEG = (
-    3.0  # RMS of the turns about the second axis: with less, where the cameras stand along the first is unknown
-)
+ONE_AXIS_DEG = 3.0  # RMS of the turns about the second axis: with less, a place along the first is unknown
 
 
 @dataclass(frozen=True, eq=False)
