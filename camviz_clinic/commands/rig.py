@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -123,11 +124,16 @@ def rig_of_pictures(
         except CannotCalibrate as error:
             raise CannotCalibrate(f"{name}: {error}") from error
         found[name] = replace(seen, places=tuple(frames[name][place] for place in seen.places))
-    try:
+    with unknown_parameters_refused():
         return calibrate_rig(found, board, models, held=held, **how)
-    except CannotCalibrate:
-        raise
-    except ValueError as error:  # a parameter to fix that a model does not have
+
+
+@contextmanager
+def unknown_parameters_refused() -> Iterator[None]:
+    """Raises Refusal for a parameter to fix that a model does not have."""
+    try:
+        yield
+    except ValueError as error:
         if not str(error).startswith("fixed"):
             raise
         raise Refusal(f"{error}.") from error

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from camviz_clinic.commands.boards import add_board, board_of
 from camviz_clinic.commands.common import Parser, Refusal, narrator, write_whole
 from camviz_clinic.commands.outcome import judged, stamped, written
-from camviz_clinic.commands.rig import held_of, models_of, pm
+from camviz_clinic.commands.rig import held_of, models_of, pm, unknown_parameters_refused
 from camviz_clinic.commands.rolling import is_rolling
 
 if TYPE_CHECKING:
@@ -159,14 +159,8 @@ def several_of_pictures(
                 f"{name}: none of the boards {', '.join(file.boards)} is in its {len(paths)} pictures"
             )
     how = {key: value for key, value in how.items() if key != "board_warp"}
-    try:
+    with unknown_parameters_refused():
         return calibrate_boards(found, file.boards, models, apart=file.apart, known=file.known, held=held, **how)
-    except CannotCalibrate:
-        raise
-    except ValueError as error:  # a parameter to fix that a model does not have
-        if not str(error).startswith("fixed"):
-            raise
-        raise Refusal(f"{error}.") from error
 
 
 def told_of(solved: SolvedBoards, file: BoardsFile) -> list[str]:
