@@ -167,6 +167,7 @@ def told_of(solved: SolvedBoards, file: BoardsFile) -> list[str]:
     """What came out, in sentences."""
     import numpy as np
 
+    from camviz_clinic.commands.telling import camera_line
     from camviz_clinic.rigs import relative_pose
 
     adjustment, calibration = solved.adjustment, solved.calibration
@@ -175,16 +176,9 @@ def told_of(solved: SolvedBoards, file: BoardsFile) -> list[str]:
         of = dict(
             zip(calibration.estimated[name], np.sqrt(np.diag(calibration.intrinsics_covariance[name])), strict=True)
         )
-        values = [
-            f"{key} = {getattr(camera.intrinsics, key):.2f}" + (f" ± {of[key]:.2f}" if key in of else "")
-            for key in ("fx", "fy", "cx", "cy")
-        ]
         used = adjustment.used[name]
-        rms = np.sqrt(np.mean(np.sum(adjustment.residuals[name][used] ** 2, axis=-1)))
-        said.append(
-            f"{name}: {', '.join(values)} px; RMS error {rms:.3f} px over {used.sum()} corners in "
-            f"{used.any(axis=1).sum()} views."
-        )
+        rms = float(np.sqrt(np.mean(np.sum(adjustment.residuals[name][used] ** 2, axis=-1))))
+        said.append(camera_line(name, camera.intrinsics, of, rms=rms, used=used))
     first = next(iter(calibration.cameras))
     beside = [relative_pose(adjustment, name, first) for name in calibration.cameras if name != first]
     beside += [solved.place(name) for group in solved.groups for name in group[1:]]

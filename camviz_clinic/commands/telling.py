@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
+    from camviz.cameras import Intrinsics
     from camviz_clinic.files import Calibration
+
+_SHOWN = ("fx", "fy", "cx", "cy")
 
 
 def report(calibration: Calibration) -> list[str]:
@@ -19,21 +23,10 @@ def report(calibration: Calibration) -> list[str]:
     said += calibration.notes
     for name, camera in calibration.cameras.items():
         deviations = np.sqrt(np.diag(calibration.intrinsics_covariance[name]))
+        of = dict(zip(calibration.estimated[name], deviations, strict=True))
         undecided = summary.undecided(name)
-        of = {
-            key: "not known" if key in undecided else f"{deviation:.2f}"
-            for key, deviation in zip(calibration.estimated[name], deviations, strict=True)
-        }
-        grid = camera.intrinsics
-        values = [
-            f"{key} = {getattr(grid, key):.2f}" + (f" ± {of[key]}" if key in of else "")
-            for key in ("fx", "fy", "cx", "cy")
-        ]
-        used = calibration.used(name)
-        views = int(used.any(axis=1).sum())
         said.append(
-            f"{name}: {', '.join(values)} px; RMS error {calibration.rms(name):.3f} px over {used.sum()} corners in "
-            f"{views} views."
+            camera_line(name, camera.intrinsics, of, undecided, rms=calibration.rms(name), used=calibration.used(name))
         )
     said += summary.withheld
     if bend := summary.bend_sentence:
@@ -43,6 +36,25 @@ def report(calibration: Calibration) -> list[str]:
         length = np.sqrt(x * x + y * y + z * z)
         said.append(f"right stands {length:.2f} mm from left: x = {x:.2f}, y = {y:.2f}, z = {z:.2f} mm in its frame.")
     return said
+
+
+def camera_line(
+    name: str,
+    grid: Intrinsics,
+    deviations: Mapping[str, float],
+    undecided: Collection[str] = (),
+    *,
+    rms: float | None,
+    used: np.ndarray,
+) -> str:
+    """One camera in a sentence: what was estimated with its ±, and `used`, its corners as booleans (views, corners)."""
+    of = {key: "not known" if key in undecided else f"{deviation:.2f}" for key, deviation in deviations.items()}
+    values = [f"{key} = {getattr(grid, key):.2f}" + (f" ± {of[key]}" if key in of else "") for key in _SHOWN]
+    error = "not known" if rms is None else f"{rms:.3f} px"
+    return (
+        f"{name}: {', '.join(values)} px; RMS error {error} over {used.sum()} corners in "
+        f"{int(used.any(axis=1).sum())} views."
+    )
 
 
 def worth(calibration: Calibration, goal: float | None) -> list[str]:
