@@ -49,6 +49,12 @@ def test_every_question_has_one_correct_choice_and_every_wrong_one_its_misconcep
 
 
 @pytest.mark.parametrize("one", ALL, ids=lambda one: one.name)
+def test_no_asterisk_of_emphasis_is_left_for_a_reader_to_see(one):
+    texts = [one.text, *(words for choice in one.choices for words in (choice.text, choice.reply))]
+    assert [text for text in texts if "*" in prose.to_html(text)] == []
+
+
+@pytest.mark.parametrize("one", ALL, ids=lambda one: one.name)
 def test_a_reply_is_a_sentence_of_its_own_and_ends_like_one(one):
     for choice in one.choices:
         assert len(choice.reply.split()) >= 6, choice.text

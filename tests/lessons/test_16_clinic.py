@@ -514,8 +514,8 @@ def test_losses_that_forgive(says):
         return np.sqrt(np.mean(np.sum(off[good] ** 2, axis=-1)))
 
     assert least == harm(shift.value, "linear")
-    assert 0.06 < max(harm(by, "huber") for by in (2, 4, 6, shift.value)) < huber.value
-    assert 0.015 < harm(shift.value, "cauchy") < cauchy.value
+    assert huber.value - 0.01 < max(harm(by, "huber") for by in (2, 4, 6, shift.value)) < huber.value
+    assert cauchy.value - 0.01 < harm(shift.value, "cauchy") < cauchy.value
     assert harm(1, "cauchy") > 1.5 * harm(8, "cauchy")  # hardly told from noise
 
 
