@@ -515,7 +515,7 @@ def test_losses_that_forgive(says):
 
     assert least == harm(shift.value, "linear")
     assert huber.value - 0.01 < max(harm(by, "huber") for by in (2, 4, 6, shift.value)) < huber.value
-    assert cauchy.value - 0.01 < harm(shift.value, "cauchy") < cauchy.value
+    assert cauchy.value - 0.005 < harm(shift.value, "cauchy") < cauchy.value
     assert harm(1, "cauchy") > 1.5 * harm(8, "cauchy")  # hardly told from noise
 
 
