@@ -37,6 +37,7 @@ from camviz_clinic.commands.rig import (
     placed,
     refuse_mixed,
     rig_of_pictures,
+    unknown_parameters_refused,
     usual_name,
 )
 from camviz_clinic.commands.rolling import ROLLING, add_rolling, calibrate_rolling, is_rolling
@@ -328,15 +329,12 @@ def _solved(solve: Callable[[], Calibration], skipped: Sequence[tuple[str, str]]
     from camviz_clinic.calibration import CannotCalibrate
 
     try:
-        return solve()
+        with unknown_parameters_refused():
+            return solve()
     except CannotCalibrate as error:
         named = ", ".join(f"{picture} ({why})" for picture, why in skipped[:3])
         more = f" and {len(skipped) - 3} more" * (len(skipped) > 3)
         raise CannotCalibrate(f"{error}{'; skipped: ' * bool(skipped)}{named}{more}") from error
-    except ValueError as error:  # a parameter to fix that the model does not have
-        if not str(error).startswith("fixed"):
-            raise
-        raise Refusal(f"{error}.") from error
 
 
 def _search(options: argparse.Namespace) -> dict[str, Any]:
