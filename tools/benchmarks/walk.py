@@ -63,7 +63,12 @@ SLIPS = [
     (" / ", " * "),
     (" < ", " > "),
     ("return -", "return "),
+    (" % ", " // "),
     (".T", ""),
+    ("axis=0", "axis=1"),
+    ("axis=-1", "axis=0"),
+    ("cam_from_world @ world_from_board", "world_from_board @ cam_from_world"),
+    ("v::", "u::"),
 ]
 RUN = """async (index) => {
   const panel = jupyterapp.shell.currentWidget;
@@ -115,6 +120,7 @@ class Student:
                 if not {"setup", "colab"} & tags and not cell.source.startswith(("ask(", "quiz(")):
                     self._read_symbols(cell.source)
                 self._run(index)
+                self._read_printed(index)
                 self._answer(index)
                 self._move(index)
 
@@ -134,6 +140,8 @@ class Student:
         for one in self._place(index).locator(".camviz-explorer").element_handles():
             one.evaluate("root => hands.settled(root)")
         self.waited_s += time.monotonic() - begun
+
+    def _read_printed(self, index: int) -> None:
         printed = self._place(index).locator(".jp-OutputArea-output pre").all_inner_texts()
         self._read(" ".join(printed))
 
@@ -210,7 +218,7 @@ class Student:
 
 
 def slip(solution: str) -> str:
-    """The solution with one thing wrong in the last line that has a sign or a transpose: another sign, or none."""
+    """The solution with one thing wrong in the last line that has one of SLIPS: a sign, an axis, an order."""
     lines = solution.splitlines()
     for number in reversed(range(len(lines))):
         for right, wrong in SLIPS:

@@ -38,7 +38,7 @@ _SHARES = {"K": 265, _AFTER: 230, "pixels": 185, "numbers": 280}  # of the secon
 _MARKS = ("balloon", "globe", "centre", "corners")
 # Of one row, by how many panels of either kind stand in it: its height at most and their widths.
 _ONE_ROW: dict[tuple[int, int], tuple[float, tuple[float, ...]]] = {
-    (1, 1): (440, (675, 285)),
+    (1, 1): (440, (620, 340)),
     (1, 2): (390, (410, 285, 265)),
     (2, 0): (390, (480, 480)),
     (2, 1): (330, (345, 330, 285)),
