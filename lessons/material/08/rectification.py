@@ -160,7 +160,7 @@ class RectificationView(TurningPair):
     def _image_panel(self, name: str) -> Panel:
         """The panel of a picture in its tile; a map has its colours beside it, and a line below."""
         (x, y, width, height), size = self._layout[_TILES[name]], self.stage.left.intrinsics
-        beside, below = (60, 24) if name in ("disparity", "second") else (0, 0)
+        beside, below = (76, 24) if name in ("disparity", "second") else (0, 0)
         return image_in((x, y, width - beside, height - below), name, size.width, size.height)
 
     def _picture_panel(self, name: str) -> str:
