@@ -20,6 +20,7 @@ import pytest
 from docutils import nodes
 from docutils.core import publish_doctree
 from PIL import Image
+from pygments.formatters import HtmlFormatter
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tools/website"))
@@ -244,6 +245,15 @@ def test_the_pages_script_is_the_notebooks_own() -> None:
 def test_the_icon_font_is_left_out_and_another_font_is_not():
     sheet = r"@font-face{font-family:Font Awesome\ 7 Free;src:url(a)}@font-face{font-family:Own;src:url(b)}"
     assert slim_styles.used(sheet, set()) == "@font-face{font-family:Own;src:url(b)}"
+
+
+@pytest.mark.parametrize("style", ["a11y-high-contrast-light", "a11y-high-contrast-dark"])
+def test_code_whose_elements_are_left_out_has_the_colour_of_text(style):
+    assert style in (ROOT / "tools/website/conf.py").read_text(encoding="utf-8")
+    sheet = HtmlFormatter(style=style).get_style_defs(".highlight")
+    colours = dict(re.findall(r"^\.highlight (?:\.(\w+) )?\{[^}]*?\bcolor: (#\w+)", sheet.lower(), re.MULTILINE))
+    assert {colours[one] for one in slim_styles.UNCOLOURED} == {colours[""]}
+    assert colours["k"] != colours[""]
 
 
 def test_a_constant_is_explained_by_its_own_words_and_not_by_its_types():
