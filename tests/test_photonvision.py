@@ -101,13 +101,15 @@ def test_camera_board_corners_poses_and_errors_are_read(loaded):
     assert not calibration.set_aside
 
 
-def test_a_corner_that_was_not_seen_or_not_used_is_told_apart(loaded):
-    """(-1, -1) was not seen; PhotonVision gives no error for a corner that it did not use."""
+@pytest.mark.parametrize("all_listed", [False, True])
+def test_a_corner_that_was_not_seen_or_not_used_is_told_apart(loaded, all_listed):
+    """(-1, -1) was not seen; PhotonVision gives no error for a corner that it did not use, or one that does not count."""
     seen = corners(0)
     seen[3] = -1
     used = [index not in (3, 8) for index in range(len(POINTS))]
     first = observation(0, locationInImageSpace=listed(seen, "xy"), cornersUsed=used)
-    first["reprojectionErrors"] = listed(-NOISE[0][used], "xy")
+    off = np.where(np.array(used)[:, None], -NOISE[0], 50.0)
+    first["reprojectionErrors"] = listed(off if all_listed else off[used], "xy")
     calibration = loaded(observations=[first, *(observation(view) for view in (1, 2, 3))])
     assert np.argwhere(np.isnan(calibration.detections["camera"]).any(axis=-1)).tolist() == [[0, 3]]
     assert np.argwhere(calibration.set_aside["camera"]).tolist() == [[0, 8]]
