@@ -103,7 +103,7 @@ def test_camera_board_corners_poses_and_errors_are_read(loaded):
 
 @pytest.mark.parametrize("all_listed", [False, True])
 def test_a_corner_that_was_not_seen_or_not_used_is_told_apart(loaded, all_listed):
-    """(-1, -1) was not seen; PhotonVision gives no error for a corner that it did not use, or one that does not count."""
+    """(-1, -1) was not seen; PhotonVision gives no error for a corner that it did not use, or one to leave out."""
     seen = corners(0)
     seen[3] = -1
     used = [index not in (3, 8) for index in range(len(POINTS))]
