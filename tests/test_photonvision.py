@@ -163,13 +163,19 @@ def test_poses_that_leave_corners_a_pixel_off_are_found_anew(loaded, shift, kept
 
 
 def test_poses_may_be_as_far_off_as_three_times_what_the_file_says(loaded):
-    """Errors of 2 px are said, 5 px are within three times of that, 7 px are not."""
-    said = [observation(view, reprojectionErrors=listed([[2.0, 0.0]] * len(POINTS), "xy")) for view in range(4)]
+    """Errors of 2 px are said of the worst view, 5 px are within three times of that, 7 px are not."""
+    off = [[2.0, 0.0], *[[0.1, 0.0]] * 3]
+    said = [observation(view, reprojectionErrors=listed([off[view]] * len(POINTS), "xy")) for view in range(4)]
     found = {}
     for shift in (5, 7):
         shifted = K + [[0, 0, shift], [0, 0, 0], [0, 0, 0]]
         found[shift] = "camera" in loaded(cameraIntrinsics=matrix(shifted), observations=said).cam_from_board
     assert found == {5: True, 7: False}
+
+
+def test_a_picture_whose_name_cannot_be_printed_has_its_number(loaded):
+    named = [observation(0, snapshotName="a\nb"), observation(1, snapshotName=""), observation(2)]
+    assert loaded(observations=named).pictures["camera"] == ("view 1", "view 2", "img2.png")
 
 
 @pytest.mark.parametrize(
@@ -181,6 +187,8 @@ def test_poses_may_be_as_far_off_as_three_times_what_the_file_says(loaded):
         {"calobjectSpacing": 1e-300},
         {"calobjectSpacing": SQUARE / 1e6},
         {"observations": [observation(0, locationInObjectSpace=[], locationInImageSpace=[], cornersUsed=[])]},
+        {"observations": [observation(0, locationInObjectSpace=listed(POINTS - [SQUARE, 0, 0], "xyz"))]},
+        {"observations": [observation(0, locationInObjectSpace=listed(POINTS * [1, 0, 0], "xyz"))]},
     ],
 )
 def test_points_of_no_board_are_named_as_dropped(loaded, changes):
