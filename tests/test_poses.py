@@ -16,7 +16,7 @@ from camviz_clinic.calibration import Board, Detections, find_corners
 from camviz_clinic.calibration.boards.picture import whiteness
 from camviz_clinic.calibration.paper import as_printed, told_by_ruler
 from camviz_clinic.calibration.types import Calibration
-from camviz_clinic.checks.snapshots import MARGIN, TEXELS, snapshot
+from camviz_clinic.checks.snapshots import SHARP, TEXELS, snapshot
 from camviz_clinic.checks.virtual import spread_boards
 from camviz_clinic.datasets import poses as module
 from camviz_clinic.datasets.poses import NoPose, find_poses
@@ -72,7 +72,7 @@ def rendered(board, seed, views, noise, finder="saddles"):
     """What is found; a chessboard may be found from its other end, but the truth begins at one."""
     rng = np.random.default_rng(seed)
     truth = spread_boards(rng, (CAMERA,), board, views, (15, 40))
-    corners = [find_corners(snapshot(CAMERA, board, pose, rng, noise), board, finder) for pose in truth]
+    corners = [find_corners(snapshot(CAMERA, board, pose, rng, noise, SHARP), board, finder) for pose in truth]
     for view, pose in enumerate(truth):
         if (
             board is CHESS
@@ -100,7 +100,7 @@ def test_rendered_chessboards_do_so_at_their_saddle_points_and_those_of_sectors_
 
 def test_a_rendered_squares_edge_lies_between_texels_where_it_is_sharp():
     """An edge through a texel is drawn as a lopsided ramp, and corners are found 0.03 px beside it."""
-    white = whiteness(CHESS, TEXELS, MARGIN)
+    white = whiteness(CHESS, TEXELS, SHARP)
     assert (white * (1 - white)).max() < 1e-9
 
 

@@ -21,7 +21,7 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady, Perspective
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration import Board, Calibration, Detections, calibrate, find_corners
-from camviz_clinic.checks.snapshots import together
+from camviz_clinic.checks.snapshots import SHARP, together
 from camviz_clinic.checks.virtual import spread_boards
 from camviz_clinic.datasets.folder import MODEL, TRANSFORMS, write_poses
 from camviz_clinic.datasets.poses import CameraPoses, find_poses
@@ -70,7 +70,7 @@ def photographed(kind: str, rng: np.random.Generator) -> tuple[Detections, Rigid
     """What is found in photographs of a board, and its true poses in all of them."""
     board, grid = BOARDS[kind], CAMERA.intrinsics
     truth = spread_boards(rng, (CAMERA,), board, VIEWS, TILT_DEG)
-    pictures = [together(CAMERA, [board], RigidTransform.concatenate([pose]), rng, NOISE) for pose in truth]
+    pictures = [together(CAMERA, [board], RigidTransform.concatenate([pose]), rng, NOISE, SHARP) for pose in truth]
     corners = [find_corners(picture, board, FINDERS.get(kind, "saddles")) for picture in pictures]
     places = [view for view, seen in enumerate(corners) if seen is not None]
     names = tuple(f"{view}.png" for view in places)
