@@ -24,6 +24,7 @@ from camviz_clinic.calibration import (
     find_corners,
 )
 from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.chessboards import at_saddles
 from camviz_clinic.calibration.detection import detect_pair
 from camviz_clinic.calibration.models import pose_from_rays
 from camviz_clinic.calibration.pairing import paired
@@ -87,11 +88,26 @@ def turned(image, corners):
     return cv2.rotate(image, cv2.ROTATE_180), np.array([image.shape[1] - 1, image.shape[0] - 1]) - corners
 
 
-@pytest.mark.parametrize("finder", ["auto", "sectors", "classic"])
+@pytest.mark.parametrize("finder", ["auto", "sectors", "classic", "saddles"])
 def test_the_corners_of_a_chessboard_are_found_in_the_boards_order_however_it_is_held(finder):
     for image, corners in (picture(BOARD, TILTED), turned(*picture(BOARD, TILTED))):
         found = find_corners(image, BOARD, finder)
-        assert np.abs(found - corners).max() < (0.3 if finder == "classic" else 0.1)
+        assert np.abs(found - corners).max() < (0.3 if finder in ("classic", "saddles") else 0.1)
+
+
+def test_saddles_close_to_the_border_are_measured_in_a_smaller_window():
+    """Corners that are off by half a pixel are brought back, also 4 px from the border, but not 1 px from it."""
+    image, corners = picture(BOARD, TILTED)
+    image = cv2.GaussianBlur(image, (0, 0), 0.8)
+    left, top = np.floor(corners.min(axis=0)).astype(int)
+    for room, most in ((4, 0.15), (1, 0.6)):
+        part = np.ascontiguousarray(image[top - room :, left - room :])
+        true = corners - [left - room, top - room]
+        moved = np.linalg.norm(at_saddles(part, true + [0.4, -0.3], BOARD) - true, axis=1)
+        outermost = np.argmin(true.min(axis=1))
+        assert moved[outermost] < most
+        assert (moved[outermost] == pytest.approx(0.5)) == (room < 2)
+        assert np.median(moved) < 0.1
 
 
 def test_in_a_large_picture_the_corners_are_where_they_are_in_a_small_one():

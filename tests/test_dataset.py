@@ -97,8 +97,9 @@ def test_transforms_and_the_model_are_read_back_to_a_billionth_of_a_pixel(scene)
 
 def test_pycolmap_reads_the_model_to_a_billionth_of_a_pixel(scene):
     pycolmap = pytest.importorskip("pycolmap", reason="pycolmap, the oracle of this test, is not installed")
-    held = archive(scene)
-    images = {each.name: each for each in pycolmap.Reconstruction(scene.out / "sparse/0").images.values()}
+    held, model = archive(scene), pycolmap.Reconstruction(scene.out / "sparse/0")
+    assert model.num_points3D() == 0
+    images = {each.name: each for each in model.images.values()}
     assert set(images) == set(held["names"].tolist())
     for name, cam_from_world in zip(held["names"], held["cam_from_world"], strict=True):
         X = POINTS @ cam_from_world[:3, :3].T + cam_from_world[:3, 3]

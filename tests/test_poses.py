@@ -13,9 +13,10 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration import Board, Detections, find_corners
+from camviz_clinic.calibration.boards.picture import whiteness
 from camviz_clinic.calibration.paper import as_printed, told_by_ruler
 from camviz_clinic.calibration.types import Calibration
-from camviz_clinic.checks.snapshots import snapshot
+from camviz_clinic.checks.snapshots import SHARP, TEXELS, snapshot
 from camviz_clinic.checks.virtual import spread_boards
 from camviz_clinic.datasets import poses as module
 from camviz_clinic.datasets.poses import NoPose, find_poses
@@ -67,10 +68,17 @@ def test_one_marker_gives_poses_within_3_sigmas_and_none_of_its_four_corners_is_
     assert 0.85 < np.sqrt(np.mean(off**2)) < 1.1  # a view that scatters more by chance has a larger ±
 
 
-def rendered(board, seed, views, noise):
+def rendered(board, seed, views, noise, finder="saddles"):
+    """What is found; a chessboard may be found from its other end, but the truth begins at one."""
     rng = np.random.default_rng(seed)
     truth = spread_boards(rng, (CAMERA,), board, views, (15, 40))
-    corners = [find_corners(snapshot(CAMERA, board, pose, rng, noise), board) for pose in truth]
+    corners = [find_corners(snapshot(CAMERA, board, pose, rng, noise, SHARP), board, finder) for pose in truth]
+    for view, pose in enumerate(truth):
+        if (
+            board is CHESS
+            and np.linalg.norm(corners[view] - CAMERA.project(pose.apply(board.corners)), axis=1).min() > 5
+        ):
+            corners[view] = corners[view][::-1]
     return detections(corners), truth
 
 
@@ -78,6 +86,22 @@ def rendered(board, seed, views, noise):
 def test_rendered_tags_give_poses_within_3_sigmas_in_99_percent(seed):
     found, truth = rendered(TAGS, seed, 12, 6)
     assert (np.abs(in_sigmas(find_poses(CAMERA, TAGS, found), truth)) < 3).mean() >= 0.99
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.thorough) for n in range(1, 6))])
+def test_rendered_chessboards_do_so_at_their_saddle_points_and_those_of_sectors_do_not(seed):
+    found, truth = rendered(CHESS, seed, 12, 3)
+    pulls = in_sigmas(find_poses(CAMERA, CHESS, found), truth)
+    assert (np.abs(pulls) < 3).mean() >= 0.985  # of 72 numbers one may be off
+    assert np.sqrt(np.mean(pulls**2)) < 1.2
+    found, truth = rendered(CHESS, seed, 12, 3, "sectors")
+    assert np.sqrt(np.mean(in_sigmas(find_poses(CAMERA, CHESS, found), truth) ** 2)) > 1.3
+
+
+def test_a_rendered_squares_edge_lies_between_texels_where_it_is_sharp():
+    """An edge through a texel is drawn as a lopsided ramp, and corners are found 0.03 px beside it."""
+    white = whiteness(CHESS, TEXELS, SHARP)
+    assert (white * (1 - white)).max() < 1e-9
 
 
 def test_the_pose_is_opencvs_of_the_same_corners():
@@ -223,6 +247,20 @@ def test_a_table_and_a_tree_say_where_the_camera_stood(words, photos, room, caps
         assert each["sigma_m"] == pytest.approx(sigma)
         assert np.sqrt(np.diag(each["covariance"])[:3]) == pytest.approx(np.radians(each["sigma_deg"]))
         assert each["picture"] == row["picture"]
+
+
+def test_chessboards_are_found_at_their_saddle_points_unless_another_finder_is_named(room):
+    rng = np.random.default_rng(9)
+    pose = spread_boards(rng, (CAMERA,), CHESS, 1, (25, 25))[0]
+    picture = snapshot(CAMERA, CHESS, pose, rng, 3)
+    cv2.imwrite(str(room / "0.png"), picture)
+    write(Calibration({"camera": CAMERA}, room, "virtual"), room / "camera.yaml", "opencv")
+    command = ("poses", "camera.yaml", "0.png", "--board", "9x6", "--square-mm", "25", "-o", "poses.json")
+    for finder, more in (("saddles", ()), ("sectors", ("--finder", "sectors"))):
+        assert main((*command, *more)) == 0
+        there = json.loads((room / "poses.json").read_text(encoding="utf-8"))["pictures"][0]["board_from_cam"]
+        expected = find_poses(CAMERA, CHESS, detections([find_corners(picture, CHESS, finder)])).board_from_cam
+        assert np.array(there) == pytest.approx(expected.as_matrix()[0], abs=1e-8)
 
 
 def test_the_ruler_scales_the_places(words, room):

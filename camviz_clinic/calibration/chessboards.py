@@ -23,6 +23,8 @@ AGREE = 0.5  # of the narrowest square: further apart, rough and exact corners a
 THOROUGH = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_EXHAUSTIVE
 CONTRAST = 0.5  # of the board's own: fields beyond its edge that differ by more are squares
 WINDOW = 11  # pixels to either side of a corner that OpenCV's samples refine it from
+CLEAR = 0.4  # of the narrowest square: wider windows reach the edges that meet in the next corner
+LEAST_WINDOW = 2
 SUBPIXEL = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 30, 0.001)
 
 
@@ -34,8 +36,10 @@ def find_chessboard(gray: NDArray[Any], board: Shape, finder: str = "auto") -> A
     if min(board.columns, board.rows) < LEAST_SIDE:
         return None
     corners = _sectors(gray, board) if finder != "classic" else _classic(gray, board, WINDOW)
-    if corners is None and finder == "auto":
+    if corners is None and finder in ("auto", "saddles"):
         corners = _classic(gray, board)
+    if corners is not None and finder == "saddles":
+        corners = at_saddles(gray, corners, board)
     return corners if corners is None else _black_first(gray, corners, board)
 
 
@@ -113,12 +117,32 @@ def _classic(gray: NDArray[Any], board: Shape, window: int | None = None) -> Arr
     found, corners = cv2.findChessboardCorners(gray, (board.columns, board.rows))
     if not found:
         return None
-    corners = np.ascontiguousarray(corners, dtype=np.float32).reshape(-1, 1, 2)
-    if window is None:
-        spacing = _spacing(corners.reshape(-1, 2).astype(float), board).min()
-        window = int(np.clip(0.4 * spacing, 2, WINDOW))
-    refined = cv2.cornerSubPix(gray, corners, (window, window), (-1, -1), SUBPIXEL)
-    return np.asarray(refined, dtype=float).reshape(-1, 2)
+    corners = np.asarray(corners, dtype=float).reshape(-1, 2)
+    return _refined(gray, corners, _window(corners, board) if window is None else window)
+
+
+def at_saddles(gray: NDArray[Any], corners: Array, board: Shape) -> Array:
+    """The corners (n, 2) moved to where the edges around each of them meet (`cv2.cornerSubPix`).
+
+    Sectors are off by an error that neighbours share, which no residual tells. Near the picture's border the windows
+    are as wide as there is room; a corner without room for one stays where it is.
+    """
+    widest, last = _window(corners, board), np.array(gray.shape[::-1]) - 1
+    windows = np.floor(np.minimum(corners, last - corners)).min(axis=1).clip(0, widest).astype(int)
+    moved = corners.copy()
+    for window in np.unique(windows[windows >= LEAST_WINDOW]):
+        moved[windows == window] = _refined(gray, corners[windows == window], int(window))
+    return moved
+
+
+def _window(corners: Array, board: Shape) -> int:
+    """Half the width in pixels of a window that keeps clear of the neighbouring corners."""
+    return int(np.clip(CLEAR * _spacing(corners, board).min(), LEAST_WINDOW, WINDOW))
+
+
+def _refined(gray: NDArray[Any], corners: Array, window: int) -> Array:
+    start = np.ascontiguousarray(corners, dtype=np.float32).reshape(-1, 1, 2)
+    return np.asarray(cv2.cornerSubPix(gray, start, (window, window), (-1, -1), SUBPIXEL), dtype=float).reshape(-1, 2)
 
 
 def _black_first(gray: NDArray[Any], corners: Array, board: Shape) -> Array:

@@ -123,7 +123,7 @@ def detect(
     Args:
         paths: The pictures.
         board: What they show.
-        finder: {"auto", "sectors", "classic"}, how a chessboard is found: see `find_corners`.
+        finder: {"auto", "sectors", "classic", "saddles"}, how a chessboard is found: see `find_corners`.
         workers: Processes; unless given, as many as there are processors, for many pictures.
         progress: callable, called with the numbers of pictures done and in all.
         seconds: A search that takes longer is ended, and its picture skipped. Unless given, that is so after two

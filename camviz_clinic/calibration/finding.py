@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-FINDERS = ("auto", "sectors", "classic")
+FINDERS = ("auto", "sectors", "classic", "saddles")
 
 
 def find_corners(image: NDArray[Any], board: Shape, finder: str = "auto") -> Array | None:
@@ -38,9 +38,9 @@ def find_corners(image: NDArray[Any], board: Shape, finder: str = "auto") -> Arr
     Args:
         image: (height, width) or (height, width, 3), grey or RGB, 8 bits.
         board: Board, what to look for.
-        finder: {"auto", "sectors", "classic"}, how a chessboard is found. "sectors" is OpenCV's
+        finder: {"auto", "sectors", "classic", "saddles"}, how a chessboard is found. "sectors" is OpenCV's
             findChessboardCornersSB, "classic" is findChessboardCorners with cornerSubPix, "auto" the first of the two
-            that finds it.
+            that finds it. "saddles" refines the corners of "auto" by cornerSubPix, in a window clear of the next ones.
 
     Returns:
         (columns * rows, 2) or None, pixels, NaN for points of a ChArUco board or of an AprilGrid that are not seen;

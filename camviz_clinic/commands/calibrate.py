@@ -88,7 +88,7 @@ exit status:
 """
 MOST_WORDS = 1000
 BOARD_WARP = ("auto", "on", "off")
-FINDERS = ("auto", "sectors", "classic")
+FINDERS = ("auto", "sectors", "classic", "saddles")
 
 
 def add(commands: Any) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from camviz_clinic.commands.boards import add_board
-from camviz_clinic.commands.calibrate import FINDERS, MODELS, add_seconds, report
+from camviz_clinic.commands.calibrate import MODELS, add_seconds, report
 from camviz_clinic.commands.common import (
     OK,
     Refusal,
@@ -18,7 +18,7 @@ from camviz_clinic.commands.common import (
     whole_folder,
 )
 from camviz_clinic.commands.pictures import pictures
-from camviz_clinic.commands.poses import add_ruler, looked, measured_board, poses_of
+from camviz_clinic.commands.poses import add_finder, add_ruler, looked, measured_board, poses_of
 from camviz_clinic.commands.terminal import tell
 from camviz_clinic.commands.undistort import (
     IMAGES,
@@ -73,7 +73,7 @@ def add(commands: Any) -> None:
     add_ruler(command)
     command.add_argument("--model", choices=list(MODELS), default="standard", help="which lens (default: standard)")
     add_alpha(command)
-    command.add_argument("--finder", choices=FINDERS, default="auto", help="how chessboards are found")
+    add_finder(command)
     add_seconds(command)
     add_megapixels(command)
 

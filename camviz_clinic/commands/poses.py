@@ -59,13 +59,20 @@ def add(commands: Any) -> None:
     command.add_argument("--camera", metavar="NAME", help="the camera that took IMAGES, where CAMERA has several")
     add_board(command, required=False, default=False)
     add_ruler(command)
-    command.add_argument("--finder", choices=FINDERS, default="auto", help="how chessboards are found")
+    add_finder(command)
     add_seconds(command)
     command.add_argument("--size", metavar="WxH", type=size, help="image size, where CAMERA does not hold it")
     command.add_argument(
         "-o", "--output", metavar="OUT", type=Path, default=Path("poses.csv"), help=".csv or .json (default: poses.csv)"
     )
     add_megapixels(command)
+
+
+def add_finder(command: argparse.ArgumentParser) -> None:
+    """By default at saddles: what a finder errs over the whole board turns the pose, and is not in its ±."""
+    command.add_argument(
+        "--finder", choices=FINDERS, default="saddles", help="how chessboards are found (default: saddles)"
+    )
 
 
 def add_ruler(command: argparse.ArgumentParser) -> None:
