@@ -1,5 +1,7 @@
 """A distorted picture: what of it is valid, how far its pixels move, and the way there and back. For any lens."""
 
+from __future__ import annotations
+
 import cv2
 import numpy as np
 
@@ -14,7 +16,6 @@ def valid_region(camera: Camera, step_px: int = 1) -> np.ndarray:
     """At which pixels a ray arrives.
 
     Args:
-        camera: With any lens.
         step_px: Only every so many pixels are asked.
 
     Returns: (rows, columns) of bool, True where a ray arrives.
@@ -40,7 +41,6 @@ def displacement(camera: Camera, step_px: float) -> tuple[Array, Array]:
     The grid is centred on the image; the undistorted picture has the camera's own K.
 
     Args:
-        camera: With any lens.
         step_px: Distance of neighbouring points in pixels.
 
     Returns:
@@ -101,7 +101,6 @@ def distort_maps(camera: Camera, source: Intrinsics, lens: Lens | None = None) -
     Needs the inverse of the lens at every output pixel.
 
     Args:
-        camera: Whose lens bends.
         source: Of the ideal picture.
         lens: Of the ideal picture; perspective unless given.
 
@@ -143,7 +142,6 @@ def undistorted_intrinsics(camera: Camera, alpha: float) -> tuple[Intrinsics, tu
     fold or 80° from the axis are left out.
 
     Args:
-        camera: With any lens.
         alpha: From 0 to 1.
 
     Returns:

@@ -1,5 +1,7 @@
 """The polynomial that most calibrations hold: radial, tangential, rational, thin prism and tilt, as OpenCV has them."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -7,13 +9,12 @@ from math import atan, cos, inf, pi, sin, sqrt
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.typing import ArrayLike
 
+from camviz.lenses.arrays import Coordinates, ImagePoints, ImagePointsLike, Jacobians, Mask, Radii, RadiiLike
 from camviz.lenses.base import Array, as_points, blockwise, check_parameters, check_range
 from camviz.lenses.declarations import CalibrationModel, Example, Fold, Spelling
-from camviz.lenses.folding import FoldingLens, homography
+from camviz.lenses.folding import FoldingLens, first_positive_root
 from camviz.lenses.perspective import Perspective
-from camviz.lenses.roots import first_positive_root
 
 GRID = "fx fy cx cy"
 RADTAN = "k1 k2 p1 p2"
@@ -142,13 +143,12 @@ class BrownConrady(FoldingLens):
             check_range(name, value, abs(value) < pi / 2, "an angle between -π/2 and π/2 radians")
 
     @classmethod
-    def from_coefficients(cls, coefficients: Iterable[float]) -> "BrownConrady":
+    def from_coefficients(cls, coefficients: Iterable[float]) -> BrownConrady:
         """From a list of coefficients, as OpenCV and ROS write them.
 
         Args:
-            coefficients: 4, 5, 8, 12 or 14 numbers: k1, k2, p1, p2, k3 and so on, in OpenCV's order.
+            coefficients: 4, 5, 8, 12 or 14 numbers: k1, k2, p1, p2, k3 and so on, in OpenCV's order. The rest is 0.
 
-        Returns: BrownConrady with 0 for what is left out.
         Raises: ValueError for any other number of coefficients.
 
         >>> BrownConrady.from_coefficients([-0.3, 0.1, 0, 0, 0.02]).k3
@@ -165,38 +165,18 @@ class BrownConrady(FoldingLens):
 
     # The polynomial itself, without regard to its domain: how it folds can be looked at.
 
-    def radial(self, r: ArrayLike) -> Array:
-        """g(r) = r N(r²)/D(r²), the distorted radius of an ideal one.
-
-        Args:
-            r: (...), ideal radii in focal lengths.
-
-        Returns: (...), distorted radii in focal lengths, beyond the fold as well.
-        """
+    def radial(self, r: RadiiLike) -> Radii:
+        """g(r) = r N(r²)/D(r²), the distorted radius of an ideal one, beyond the fold as well."""
         r = np.asarray(r, dtype=float)
         with np.errstate(all="ignore"):
             return r * self._ratio(r * r)
 
-    def distort(self, xy: ArrayLike) -> Array:
-        """Distorted points of ideal ones, beyond the fold as well.
-
-        Args:
-            xy: (..., 2), ideal points in focal lengths.
-
-        Returns: (..., 2), distorted points in focal lengths.
-        Raises: ValueError where the last axis has not 2 coordinates.
-        """
+    def distort(self, xy: ImagePointsLike) -> ImagePoints:
+        """Distorted points of ideal ones, beyond the fold as well."""
         return blockwise(self._distort, as_points(xy, 2, "xy"), 2)
 
-    def jacobian(self, xy: ArrayLike) -> Array:
-        """The derivative of `distort`, exact.
-
-        Args:
-            xy: (..., 2), ideal points in focal lengths.
-
-        Returns: (..., 2, 2), ∂x'y'/∂xy, without unit.
-        Raises: ValueError where the last axis has not 2 coordinates.
-        """
+    def jacobian(self, xy: ImagePointsLike) -> Jacobians:
+        """The derivative of `distort`, exact."""
         xy = as_points(xy, 2, "xy")
         bent = blockwise(lambda x, y: self._bend_and_derivatives(x, y)[2:], xy, 4).reshape(*xy.shape, 2)
         with np.errstate(all="ignore"):
@@ -256,6 +236,11 @@ class BrownConrady(FoldingLens):
         """The smallest positive root of D(r²), where the radial part is infinite; infinity if there is none."""
         return sqrt(first_positive_root(self.denominator.coef))
 
+    def valid(self, xy: ImagePointsLike) -> Mask:
+        """Whether ideal points have an image that they share with no other point of the domain."""
+        xy = as_points(xy, 2, "xy")
+        return blockwise(lambda x, y: (self._valid(x, y),), xy, 1)[..., 0] > 0
+
     # The lens.
 
     def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
@@ -266,20 +251,20 @@ class BrownConrady(FoldingLens):
         x, y = self.straighten(x, y)
         return x, y, np.ones_like(x)
 
-    def bend(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """Distorted coordinates of ideal ones.
-
-        Args:
-            x, y: (n,), ideal coordinates in focal lengths.
-
-        Returns:
-            x: (n,), distorted coordinates in focal lengths; NaN outside the domain.
-            y: (n,), the same downwards.
-        """
+    def bend(self, x: Coordinates, y: Coordinates) -> tuple[Coordinates, Coordinates]:
+        """Distorted coordinates of ideal ones; NaN outside the domain."""
         valid = self._valid(x, y)
         x, y = self._distort(x, y)
         if not valid.all():
             x[~valid] = y[~valid] = np.nan
+        return x, y
+
+    def straighten(self, x: Coordinates, y: Coordinates) -> tuple[Coordinates, Coordinates]:
+        """Ideal coordinates of distorted ones, by Newton's method; NaN where there are none."""
+        u, v = self._untilt(x, y)
+        within = u * u + v * v <= self._rim[1].max() ** 2
+        x, y = np.full((2, len(u)), np.nan)
+        x[within], y[within] = self._straighten(u[within], v[within])
         return x, y
 
     # Forwards. With m = N/D + 2 (p1 y + p2 x): x' = x m + (p2 + s1) r² + s2 r⁴, y' = y m + (p1 + s3) r² + s4 r⁴.
@@ -347,13 +332,6 @@ class BrownConrady(FoldingLens):
             share *= -self._ratio(s)
         return x * share, y * share
 
-    def _distort(self, x: Array, y: Array) -> tuple[Array, Array]:
-        x, y = self._polynomial(x, y)
-        if self._tilt is None:
-            return x, y
-        x, y, w = homography(self._tilt, x, y)
-        return x / w, y / w
-
     # The tilt: a homography between the sensor as it should be and as it is.
 
     @cached_property
@@ -365,20 +343,6 @@ class BrownConrady(FoldingLens):
         tilt = np.array([[R[2, 2], 0, -R[0, 2]], [0, R[2, 2], -R[1, 2]], [0, 0, 1]]) @ R
         tilt[:2, 2] = 0  # R₂₂ R₀₂ - R₀₂ R₂₂, without its rounding
         return tilt
-
-    def _untilt(self, x: Array, y: Array) -> tuple[Array, Array]:
-        if self._tilt is None:
-            return x, y
-        x, y, w = homography(np.linalg.inv(self._tilt), x, y)
-        w = np.where(w > 0, w, np.nan)
-        return x / w, y / w
-
-    def _tilt_jacobian(self, xy: Array) -> Array:
-        if self._tilt is None:
-            return np.eye(2)
-        x, y, w = homography(self._tilt, xy[..., 0], xy[..., 1])
-        image = np.stack([x / w, y / w], axis=-1)
-        return (self._tilt[:2, :2] - image[..., None] * self._tilt[2, :2]) / w[..., None, None]
 
     @cached_property
     def _symmetric(self) -> bool:

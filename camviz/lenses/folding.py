@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable
 from functools import cached_property
 from math import atan, inf, pi
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from camviz.lenses.base import Array, Lens, as_points, blockwise
+from camviz.lenses.arrays import Radii, RadiiLike
+from camviz.lenses.base import Array, Lens
 
 STEEPEST = np.deg2rad(89.5)  # the tables end here where the polynomial itself has no end
 UNBOUNDED = 1e150  # a radius beyond all images whose square is still a number
@@ -36,7 +37,7 @@ class FoldingLens(Lens):
         """Where the radial part is infinite, likewise."""
 
     @abstractmethod
-    def radial(self, r: ArrayLike) -> Array:
+    def radial(self, r: RadiiLike) -> Radii:
         """The distorted radius of an ideal one."""
 
     @abstractmethod
@@ -61,23 +62,28 @@ class FoldingLens(Lens):
     def _tilt(self) -> Array | None:
         """The homography (3, 3) onto the sensor as it is; None where that is not tilted."""
 
-    @abstractmethod
+    def _distort(self, x: Array, y: Array) -> tuple[Array, Array]:
+        x, y = self._polynomial(x, y)
+        if self._tilt is None:
+            return x, y
+        x, y, w = homography(self._tilt, x, y)
+        return x / w, y / w
+
     def _untilt(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """What the tilt made x and y (n,) of."""
+        if self._tilt is None:
+            return x, y
+        x, y, w = homography(np.linalg.inv(self._tilt), x, y)
+        w = np.where(w > 0, w, np.nan)
+        return x / w, y / w
+
+    def _tilt_jacobian(self, xy: Array) -> Array:
+        if self._tilt is None:
+            return np.eye(2)
+        x, y, w = homography(self._tilt, xy[..., 0], xy[..., 1])
+        image = np.stack([x / w, y / w], axis=-1)
+        return (self._tilt[:2, :2] - image[..., None] * self._tilt[2, :2]) / w[..., None, None]
 
     # Where it does not fold.
-
-    def valid(self, xy: ArrayLike) -> np.ndarray:
-        """Whether ideal points have an image that they share with no other point of the domain.
-
-        Args:
-            xy: (..., 2), ideal points in focal lengths.
-
-        Returns: (...) of bool, True inside the domain.
-        Raises: ValueError where the last axis has not 2 coordinates.
-        """
-        xy = as_points(xy, 2, "xy")
-        return blockwise(lambda x, y: (self._valid(x, y),), xy, 1)[..., 0] > 0
 
     def _orientation(self, x: Array, y: Array) -> Array:
         """The Jacobian's determinant before the tilt; negative where a tilted sensor is not in front, and near."""
@@ -160,22 +166,6 @@ class FoldingLens(Lens):
         return upright
 
     # Backwards.
-
-    def straighten(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """Ideal coordinates of distorted ones, by Newton's method.
-
-        Args:
-            x, y: (n,), distorted coordinates in focal lengths.
-
-        Returns:
-            x: (n,), ideal coordinates in focal lengths; NaN where there are none.
-            y: (n,), the same downwards.
-        """
-        u, v = self._untilt(x, y)
-        within = u * u + v * v <= self._rim[1].max() ** 2
-        x, y = np.full((2, len(u)), np.nan)
-        x[within], y[within] = self._straighten(u[within], v[within])
-        return x, y
 
     def _straighten(self, u: Array, v: Array) -> tuple[Array, Array]:
         x, y, error = self._newton(u, v)
@@ -283,3 +273,39 @@ def homography(H: np.ndarray, x: Array, y: Array) -> tuple[Array, Array, Array]:
     """H (x, y, 1) as three coordinates."""
     u, v, w = (row[0] * x + row[1] * y + row[2] for row in H)
     return u, v, w
+
+
+def first_positive_root(coefficients: np.ndarray) -> float:
+    """The smallest s > 0 with c0 + c1 s + c2 s² + … = 0; infinity where there is none. c0 must not be 0.
+
+    Solved for 1/s, whose leading coefficient is c0: a vanishing last coefficient then costs no accuracy.
+    """
+    inverses = np.roots(coefficients)
+    real = inverses.real[np.abs(inverses.imag) <= 1e-7 * np.abs(inverses)]
+    largest = real.max(initial=0.0)
+    return float(1 / largest) if largest > 0 else np.inf
+
+
+def solve_rising(
+    function: Callable[[Array], Array], slope: Callable[[Array], Array], value: Array, nodes: Array, levels: Array
+) -> Array:
+    """The t (n,) with function(t) = value (n,), by Newton's method kept inside the bracket that a table gives.
+
+    `levels` are the function's values at the rising `nodes`, between whose ends it must rise. NaN for a value beyond
+    the table and where the equation does not hold to 13 digits in the end.
+    """
+    cell = np.clip(np.searchsorted(levels, value, side="right"), 1, len(nodes) - 1)
+    low, high = nodes[cell - 1], nodes[cell]
+    t = low + (high - low) * (value - levels[cell - 1]) / (levels[cell] - levels[cell - 1])
+    t[(value < levels[0]) | (value > levels[-1])] = np.nan
+    todo = np.arange(len(t))
+    for _ in range(60):
+        error = function(t[todo]) - value[todo]
+        off = np.abs(error) > 1e-13 * value[todo]
+        todo, error = todo[off], error[off]
+        if not len(todo):
+            return t
+        # f(t) = value  →  t ← t - (f(t) - value) / f'(t)
+        t[todo] = np.clip(t[todo] - error / slope(t[todo]), low[todo], high[todo])
+    t[todo] = np.nan
+    return t

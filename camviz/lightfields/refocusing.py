@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from camviz.lenses.arrays import LinearPicture32
 from camviz.lenses.base import Array
 from camviz.lightfields.field import LightField
 from camviz.lightfields.plenoptic import grid_of
@@ -17,7 +18,7 @@ from camviz.scenes.light import to_linear
 Floats = NDArray[np.float32]
 
 
-def refocus(field: LightField, disparity: float, mask: ArrayLike | None = None) -> Floats:
+def refocus(field: LightField, disparity: float, mask: ArrayLike | None = None) -> LinearPicture32:
     """The picture that is sharp where points move by a disparity: shift and sum.
 
     R(x, y) = Σ w_vu L_vu(x − d u, y − d v) / Σ w_vu, with u and v counted from the aperture's middle. Between pixels
@@ -28,7 +29,6 @@ def refocus(field: LightField, disparity: float, mask: ArrayLike | None = None) 
         disparity: In pixels a view; 0 is the focus of the field.
         mask: (rows, columns), the weights w ≥ 0 of the views, such as `aperture` gives; by default all share alike.
 
-    Returns: (height, width, 3), linear light, float32.
     Raises: ValueError for a mask of another shape or with no view in it, and a disparity that is not finite.
     Source: R. Ng, Fourier slice photography, ACM Trans. Graph. 24 (2005).
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from camviz.lenses.arrays import MillimetresLike, RatiosLike
 from camviz.lenses.base import Array
 
 
@@ -137,11 +137,10 @@ class Prescription:
         """The second principal plane, behind the *first* surface: image distances count from it."""
         return self.length_mm + self.back_focal_mm - self.focal_mm
 
-    def trace(self, height_mm: ArrayLike, slope: ArrayLike, reach_mm: float = 0.0) -> tuple[Array, Array]:
+    def trace(self, height_mm: MillimetresLike, slope: RatiosLike, reach_mm: float = 0.0) -> tuple[Array, Array]:
         """Rays through the lens, to the back focal point.
 
         Args:
-            height_mm, slope: (...), heights in mm and slopes, as ratios, of the rays where they start.
             reach_mm: Where they start: so far before the first surface.
 
         Returns:
