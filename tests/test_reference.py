@@ -338,6 +338,7 @@ def of_parameters(value, given, own=types.MappingProxyType({})):
     silent = {name: of_alias(value, its) for name, its in types_.items() if name not in said and of_alias(value, its)}
     found = [fault for name, text in silent.items() for fault in without_shape_or_unit(name, text)]
     known = {name for name, its in types_.items() if is_one_of_ours(value, its) and is_named_after(name, its)}
+    known |= {name for name, its in types_.items() if (name, its) == ("rng", "np.random.Generator")}
     expected = {name: each for name, each in expected.items() if name in said or name not in silent.keys() | known}
     if list(said) != list(expected):
         found.append(f"its parameters are {', '.join(expected)}, and documented are {', '.join(said) or 'none'}")

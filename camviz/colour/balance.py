@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from camviz.colour.spaces import D65_XY, adaptation, from_chromaticity, tristimulus
 from camviz.colour.spectra import WAVELENGTHS_NM, as_spectra
-from camviz.lenses.arrays import SpectrumLike, Xyz
+from camviz.lenses.arrays import Gains, LinearColoursLike, SpectrumLike, Xyz
 from camviz.lenses.base import Array, as_points
 
 WHITE = from_chromaticity(D65_XY)
@@ -71,13 +71,12 @@ def seen(light: SpectrumLike, reflectance: ArrayLike) -> Xyz:
 # White balance --------------------------------------------------------------------------------------------------------
 
 
-def neutral(rgb: ArrayLike) -> Array:
+def neutral(rgb: ArrayLike) -> Gains:
     """The gains that make one colour grey and leave its green.
 
     Args:
         rgb: (3,), linear.
 
-    Returns: (3,), what to multiply red, green and blue by.
     Raises: ValueError where a channel is not above 0.
 
     >>> neutral((0.5, 1.0, 0.8))
@@ -89,13 +88,9 @@ def neutral(rgb: ArrayLike) -> Array:
     return rgb[1] / rgb
 
 
-def grey_world(rgb: ArrayLike) -> Array:
+def grey_world(rgb: LinearColoursLike) -> Gains:
     """The gains that make the mean of all colours grey.
 
-    Args:
-        rgb: (..., 3), linear.
-
-    Returns: (3,), what to multiply red, green and blue by.
     Raises: ValueError where the mean of a channel is not above 0.
     Source: G. Buchsbaum, A spatial processor model for object colour perception, J. Franklin Inst. 310 (1980).
 
@@ -107,14 +102,12 @@ def grey_world(rgb: ArrayLike) -> Array:
     return neutral(as_points(rgb, 3, "rgb").reshape(-1, 3).mean(axis=0))
 
 
-def white_patch(rgb: ArrayLike, percentile: float = 100) -> Array:
+def white_patch(rgb: LinearColoursLike, percentile: float = 100) -> Gains:
     """The gains that make the brightest values of the three channels equal.
 
     Args:
-        rgb: (..., 3), linear.
         percentile: Below 100 it leaves out the few brightest, which may be highlights that are cut off.
 
-    Returns: (3,), what to multiply red, green and blue by.
     Raises: ValueError where the brightest of a channel is not above 0.
     Source: E. H. Land and J. J. McCann, Lightness and retinex theory, J. Opt. Soc. Am. 61 (1971).
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from camviz.colour.spectra import as_spectra, observer
-from camviz.lenses.arrays import LabLike, SpectrumLike, WhiteLike, Xyz, XyzLike
+from camviz.lenses.arrays import LabLike, LinearColoursLike, SpectrumLike, WhiteLike, Xyz, XyzLike
 from camviz.lenses.base import Array, as_points
 
 D65_XY = (0.3127, 0.3290)  # the white of sRGB (IEC 61966-2-1:1999)
@@ -99,11 +99,8 @@ def to_srgb(xyz: XyzLike) -> Array:
     return as_points(xyz, 3, "xyz") @ SRGB_FROM_XYZ.T
 
 
-def from_srgb(rgb: ArrayLike) -> Xyz:
+def from_srgb(rgb: LinearColoursLike) -> Xyz:
     """XYZ under D65 of linear sRGB: the inverse of `to_srgb`.
-
-    Args:
-        rgb: (..., 3), linear, 1 is full.
 
     Source: IEC 61966-2-1:1999.
 

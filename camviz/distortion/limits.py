@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import Lens, Perspective
-from camviz.lenses.arrays import ImagePointsLike
+from camviz.lenses.arrays import FocalLengths, ImagePointsLike
 from camviz.lenses.base import Array
 from camviz.lenses.folding import first_positive_root
 
@@ -110,10 +110,8 @@ def edge_of_field(lens: Lens, azimuth: ArrayLike) -> Array:
     return low
 
 
-def image_corner_radius(intrinsics: Intrinsics) -> float:
+def image_corner_radius(intrinsics: Intrinsics) -> FocalLengths:
     """The distance from the principal point to the farthest corner pixel: a *distorted* radius.
-
-    Returns: In focal lengths.
 
     >>> from camviz.cameras import Intrinsics
     >>> image_corner_radius(Intrinsics(601, 801, 500, 500, cx=300, cy=400))  # √(300² + 400²) / 500

@@ -8,6 +8,7 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics, rotate
 from camviz.distortion.limits import WIDEST, border_points, ideal_points
 from camviz.lenses import Lens, Perspective
+from camviz.lenses.arrays import Share
 from camviz.lenses.base import Array, on_plane
 from camviz.poses import Rotation
 
@@ -134,15 +135,12 @@ def remap(image: np.ndarray, maps: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
     return cv2.remap(image, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
 
 
-def undistorted_intrinsics(camera: Camera, alpha: float) -> tuple[Intrinsics, tuple[int, int, int, int]]:
+def undistorted_intrinsics(camera: Camera, alpha: Share) -> tuple[Intrinsics, tuple[int, int, int, int]]:
     """Intrinsics, of the camera's size, for its undistorted picture.
 
     alpha = 0 shows the largest upright rectangle without black borders, alpha = 1 every pixel of the photograph, and
     between them the focal lengths and principal points are mixed, as in cv2.getOptimalNewCameraMatrix. Rays beyond a
     fold or 80° from the axis are left out.
-
-    Args:
-        alpha: From 0 to 1.
 
     Returns:
         intrinsics: Of the undistorted picture.

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from camviz.cameras import Camera, transform
 from camviz.lenses import Perspective
-from camviz.lenses.arrays import VectorLike
+from camviz.lenses.arrays import Share, VectorLike
 from camviz.lenses.base import Array, as_point, as_points
 from camviz.poses import RigidTransform
 
@@ -104,13 +104,12 @@ class TexturedMesh:
             raise ValueError(f"picture must be uint8 (height, width, 3), got {self.picture.dtype} {self.picture.shape}")
 
     @classmethod
-    def over(cls, points: ArrayLike, picture: NDArray[np.uint8], opacity: float = 1.0) -> TexturedMesh:
+    def over(cls, points: ArrayLike, picture: NDArray[np.uint8], opacity: Share = 1.0) -> TexturedMesh:
         """The picture over a grid of points, whose rows follow the picture's.
 
         Args:
             points: (m, n, 3), at least 2 × 2, in metres.
             picture: (height, width, 3) of uint8, RGB.
-            opacity: From 0 to 1.
 
         Returns: TexturedMesh of (m - 1) × (n - 1) quads.
         Raises: ValueError for points that are no grid.

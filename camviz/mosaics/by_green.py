@@ -22,9 +22,6 @@ BY_DIFFERENCES = ("edge-aware", "Menon")
 def green_windows(values: MosaicLike, pattern: Pattern) -> Array:
     """The windows of a Bayer mosaic around its red and blue pixels, mirrored at the border.
 
-    Args:
-        pattern: One of BAYER.
-
     Returns: (n, 5, 5), linear light, row by row of the n red and blue pixels.
     Raises: ValueError for a mosaic of another shape, and for other patterns.
 
@@ -43,7 +40,6 @@ def with_green(values: MosaicLike, pattern: Pattern, green: ArrayLike, algorithm
     """The picture of a Bayer mosaic whose green was guessed elsewhere.
 
     Args:
-        pattern: One of BAYER.
         green: (n,), linear light at the pixels that `green_windows` names, in its order.
         algorithm: {"edge-aware", "Menon", "nearest", "bilinear", "Malvar"}. Red and blue are made as it makes them:
             green plus the interpolated differences red − green and blue − green for those of BY_DIFFERENCES, from the

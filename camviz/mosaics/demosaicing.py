@@ -69,9 +69,6 @@ def bilinear(values: MosaicLike, pattern: Pattern) -> LinearPicture:
 def malvar(values: MosaicLike, pattern: Pattern) -> LinearPicture:
     """Bilinear interpolation corrected by the second derivative of the measured colour.
 
-    Args:
-        pattern: One of BAYER.
-
     Raises: ValueError for a mosaic of another shape, and for other patterns.
     Source: H. S. Malvar, L. He and R. Cutler, High-quality linear interpolation for demosaicing of Bayer-patterned
     color images, ICASSP 2004.
@@ -96,9 +93,6 @@ def malvar(values: MosaicLike, pattern: Pattern) -> LinearPicture:
 
 def edge_aware(values: MosaicLike, pattern: Pattern) -> LinearPicture:
     """Green along the edge, not across it; then bilinear interpolation of red − green and blue − green.
-
-    Args:
-        pattern: One of BAYER.
 
     Raises: ValueError for a mosaic of another shape, and for other patterns.
     Source: J. F. Hamilton and J. E. Adams, US patent 5,629,734 (1997), for the choice of green.
@@ -126,9 +120,6 @@ def by_differences(values: ArrayLike, pattern: Pattern, green: Array) -> Array:
 
 def menon(values: MosaicLike, pattern: Pattern) -> LinearPicture:
     """Green both ways, and afterwards the way that left the smoother colours; then refined.
-
-    Args:
-        pattern: One of BAYER.
 
     Raises: ValueError for a mosaic of another shape, and for other patterns.
     Source: D. Menon, S. Andriani and G. Calvagno, Demosaicing with directional filtering and a posteriori decision,
@@ -160,7 +151,6 @@ def opencv(values: NDArray[np.uint8] | NDArray[np.uint16], pattern: Pattern, met
 
     Args:
         values: (height, width), a mosaic of linear light as uint8 or uint16.
-        pattern: One of BAYER.
         method: {"bilinear", "EA", "VNG"}. "EA" is edge-aware in green only; "VNG" takes uint8 only.
 
     Returns: (height, width, 3), linear light, of the same integer type.

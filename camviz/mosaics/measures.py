@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from camviz.lenses.arrays import ScreenPictureLike
+from camviz.lenses.arrays import ScreenPictureLike, Share
 from camviz.scenes.light import to_linear
 
 Values = NDArray[np.float32]
@@ -47,7 +47,6 @@ class Measures(NamedTuple):
 def compare(picture: ScreenPictureLike, truth: ScreenPictureLike) -> Measures:
     """All measures of a demosaiced picture against the truth.
 
-    Returns: PSNR, colour error of each pixel, and zippers.
     Raises: ValueError for pictures of different sizes.
 
     Stripes where the truth is flat are right in colour, and zippers everywhere:
@@ -105,13 +104,12 @@ def colour_error(picture: ScreenPictureLike, truth: ScreenPictureLike) -> Values
     return _colour_error(*(lab(one) for one in _pair(picture, truth)))
 
 
-def zipper(picture: ScreenPictureLike, truth: ScreenPictureLike) -> float:
+def zipper(picture: ScreenPictureLike, truth: ScreenPictureLike) -> Share:
     """The share of pixels whose contrast to their likest neighbour changed by more than can be noticed.
 
     For each pixel, that of its eight neighbours is sought which is nearest to it in the *true* picture.
     It counts where the ΔE*ab of the two differs by more than 2.3 between picture and truth.
 
-    Returns: 0 … 1.
     Raises: ValueError for pictures of different sizes.
     Source: W. Lu and Y.-P. Tan, Color filter array demosaicking: new method and performance measures, IEEE Trans. Image
     Process. 12 (2003).

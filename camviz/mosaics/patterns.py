@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from camviz.lenses.arrays import Count, LinearPicture, LinearPictureLike, MosaicLike
+from camviz.lenses.arrays import Count, LinearPicture, LinearPictureLike, MosaicLike, Share
 from camviz.lenses.base import Array
 
 RED = 0
@@ -104,13 +104,11 @@ class Pattern:
         """Whether it is one of the four phases of Bayer's array."""
         return self.tile in {pattern.tile for pattern in BAYER.values()}
 
-    def share(self, channel: int) -> float:
+    def share(self, channel: int) -> Share:
         """The share of pixels that measure a channel.
 
         Args:
             channel: RED, GREEN, BLUE or WHITE.
-
-        Returns: 0 … 1.
         """
         return sum(row.count(channel) for row in self.tile) / (self.height * self.width)
 

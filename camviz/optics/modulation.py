@@ -11,7 +11,15 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import j1
 
-from camviz.lenses.arrays import AnglesLike, FrequenciesLike, MillimetresLike, NanometresLike, RatiosLike, SecondsLike
+from camviz.lenses.arrays import (
+    AnglesLike,
+    FrequenciesLike,
+    MillimetresLike,
+    NanometresLike,
+    RatiosLike,
+    SecondsLike,
+    Shares,
+)
 from camviz.lenses.base import Array
 from camviz.optics.pinhole import GREEN_NM
 
@@ -32,12 +40,11 @@ def cutoff_per_mm(f_number: RatiosLike, wavelength_nm: NanometresLike = GREEN_NM
 
 def diffraction_transfer(
     per_mm: FrequenciesLike, f_number: RatiosLike, wavelength_nm: NanometresLike = GREEN_NM
-) -> Array:
+) -> Shares:
     """The share of a grating's contrast that a perfect lens leaves: 2/π (arccos s - s √(1 - s²)) with s = f λ N.
 
     It is the share of a round opening that it has in common with its moved copy.
 
-    Returns: (...), 1 … 0.
     Source: J. W. Goodman, Introduction to Fourier Optics (3rd ed. 2005), section 6.4.
 
     At half of the cutoff frequency 2/3 - √3/(2π) = 39 % of the contrast is left:
@@ -117,12 +124,11 @@ def lens_transfer(
 
 def unvignetted_share(
     angle_rad: AnglesLike, aperture_mm: MillimetresLike, rim_mm: MillimetresLike, distance_mm: MillimetresLike
-) -> Array:
+) -> Shares:
     """The share of the aperture that light from beside the axis can reach past a round rim in front of it.
 
     Seen aslant, the rim's disc moves aside by distance · tan θ. What is left is the overlap of two discs.
 
-    Returns: (...), 0 … 1.
     Source: S. F. Ray, Applied Photographic Optics (3rd ed. 2002).
 
     A rim as wide as the aperture, moved by half its width, leaves 2/3 - √3/(2π) = 39 %:

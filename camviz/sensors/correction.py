@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from camviz.lenses.arrays import Charges, Count, Electrons, ElectronsLike, FrameLike
+from camviz.lenses.arrays import Charges, Count, Electrons, ElectronsLike, FrameLike, Variances
 from camviz.sensors.sensor import Sensor
 
 Array = NDArray[np.float64]
@@ -82,18 +82,12 @@ class NoiseModel:
         """
         return (np.asarray(dn, dtype=float) - self.black_dn) / self.gain_dn_per_e
 
-    def temporal_variance(self, electrons: ElectronsLike) -> Array:
-        """The noise that changes from frame to frame: σ² = σ_d² + μ_e.
-
-        Returns: (...), in electrons².
-        """
+    def temporal_variance(self, electrons: ElectronsLike) -> Variances:
+        """The noise that changes from frame to frame: σ² = σ_d² + μ_e."""
         return self.dark_noise_e**2 + np.maximum(np.asarray(electrons, dtype=float), 0)
 
-    def pattern_variance(self, electrons: ElectronsLike) -> Array:
-        """What is the same in every frame: DSNU² + (PRNU μ_e)².
-
-        Returns: (...), in electrons².
-        """
+    def pattern_variance(self, electrons: ElectronsLike) -> Variances:
+        """What is the same in every frame: DSNU² + (PRNU μ_e)²."""
         return self.dsnu_e**2 + (self.prnu * np.asarray(electrons, dtype=float)) ** 2
 
     # What each remedy leaves ------------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from camviz.cameras import Camera
 from camviz.colour.spectra import WAVELENGTHS_NM, illuminant, observer, sensitivities
-from camviz.lenses.arrays import FrameLike, LinearPictureLike, Seconds
+from camviz.lenses.arrays import FrameLike, LinearPictureLike, Seconds, Share
 from camviz.lenses.base import Array
 from camviz.mosaics import BAYER, Pattern, demosaic, mosaic
 from camviz.scenes.light import to_display
@@ -135,16 +135,12 @@ class DigitalCamera:
         """Photograph a scene.
 
         Args:
-            rng: Draws the noise.
             supersample: Each pixel's light is the mean of supersample² rays.
         """
         return self.take(render(scene, self.camera, supersample), exposure_s, rng)
 
     def take(self, light: LinearPictureLike, exposure_s: Seconds, rng: np.random.Generator) -> Shot:
         """Photograph a picture of light, as `render` traces it.
-
-        Args:
-            rng: Draws the noise.
 
         Raises: ValueError for light that has not the camera's size.
         """
@@ -188,14 +184,8 @@ class DigitalCamera:
         photons, electrons = (np.asarray(one, dtype=np.float32).take(kind) for one in self.channels)
         return gathered * photons, gathered * electrons
 
-    def white_exposure_s(self, share: float = 0.8) -> float:
-        """The exposure at which a white wall on the axis fills the fullest channel to a share of saturation.
-
-        Args:
-            share: 0 … 1.
-
-        Returns: In seconds.
-        """
+    def white_exposure_s(self, share: Share = 0.8) -> Seconds:
+        """The exposure at which a white wall on the axis fills the fullest channel to a share of saturation."""
         lux = self.scene_lux * self.transmittance / (4 * self.f_number**2)
         fullest = self.channels.electrons[list(self.pattern.present)].max()
         return float(share * self.sensor.saturation_e / (lux * self.pitch_um**2 * fullest))

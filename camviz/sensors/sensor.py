@@ -162,7 +162,6 @@ class Sensor:
 
         Args:
             photons: (height, width), the number expected on each pixel during the whole exposure.
-            rng: Draws the noise.
 
         Raises:
             ValueError: For photons that are not (height, width), not finite or below zero, and an exposure below zero.
@@ -182,7 +181,6 @@ class Sensor:
 
         Args:
             electrons: (height, width), the number expected during the whole exposure.
-            rng: Draws the noise.
             photons: (height, width), photons expected, which are only reported.
 
         Raises:

@@ -19,7 +19,6 @@ def convert(photons: ArrayLike, efficiency: ArrayLike, rng: np.random.Generator)
     Args:
         photons: any shape, how many photons arrive on average.
         efficiency: any shape, η, electrons per photon.
-        rng: Draws the electrons.
 
     Source: EMVA Standard 1288, release 4.0 linear (2021).
 
@@ -37,7 +36,6 @@ def leak(
     Args:
         shape: Of what is returned.
         dark_current_e_per_s: In electrons per second and pixel.
-        rng: Draws the electrons.
 
     Source: EMVA Standard 1288, release 4.0 linear (2021).
 
@@ -67,7 +65,6 @@ def read(
 
     Args:
         read_noise_e: A standard deviation in electrons.
-        rng: Draws the noise.
 
     >>> read(np.zeros(100_000), offset_e=0, read_noise_e=5, rng=np.random.default_rng(0)).std().round(1)
     np.float32(5.0)

@@ -7,7 +7,7 @@ from math import ceil, log, log1p
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.lenses.arrays import MatrixLike
+from camviz.lenses.arrays import MatrixLike, PixelLength, Share
 from camviz.lenses.base import Array, as_points
 from camviz.poses import RigidTransform, Rotation
 from camviz.twoview.epipolar import sampson_distance, singular_values, to_homogeneous
@@ -128,9 +128,9 @@ def nearest_essential(E: MatrixLike) -> Array:
 def ransac_fundamental(
     uv_left: ArrayLike,
     uv_right: ArrayLike,
-    threshold_px: float,
+    threshold_px: PixelLength,
     rng: np.random.Generator,
-    confidence: float = 0.999,
+    confidence: Share = 0.999,
     max_samples: int = 5000,
 ) -> tuple[Array, np.ndarray]:
     """The fundamental matrix of the pairs that agree on one, and which these are.
@@ -140,9 +140,6 @@ def ransac_fundamental(
 
     Args:
         uv_left, uv_right: (n, 2), pairs in pixels, some of them wrong; a pair with a NaN agrees with none.
-        threshold_px: In pixels.
-        rng: Draws the samples.
-        confidence: Between 0 and 1.
         max_samples: The most samples.
 
     Returns:

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from math import atan2
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from camviz.cameras import Camera, Intrinsics, rotate
 from camviz.lenses import Perspective
-from camviz.lenses.arrays import DisparitiesLike, Metres
+from camviz.lenses.arrays import Depths, DepthsLike, DisparitiesLike, Metres, PixelLength
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 from camviz.twoview.epipolar import right_from_left
@@ -19,12 +18,11 @@ BESIDE = 1e-9  # of the way in the other directions: less is rounding
 
 
 def depth_from_disparity(
-    disparity: DisparitiesLike, focal_length: float, baseline: Metres, doffs: float = 0.0
+    disparity: DisparitiesLike, focal_length: PixelLength, baseline: Metres, doffs: float = 0.0
 ) -> Array:
     """Depths Z = f B / (d + doffs) of disparities.
 
     Args:
-        focal_length: f in pixels.
         doffs: cx_right − cx_left in pixels, 0 in a pair that `rectify` made.
 
     Returns: (...), in metres; inf at d + doffs = 0 and NaN below it.
@@ -38,12 +36,10 @@ def depth_from_disparity(
         return np.where(d >= 0, focal_length * baseline / np.abs(d), np.nan)
 
 
-def disparity_from_depth(depth: ArrayLike, focal_length: float, baseline: Metres, doffs: float = 0.0) -> Array:
+def disparity_from_depth(depth: DepthsLike, focal_length: PixelLength, baseline: Metres, doffs: float = 0.0) -> Array:
     """Disparities d = f B / Z − doffs of depths.
 
     Args:
-        depth: (...), Z in metres.
-        focal_length: f in pixels.
         doffs: cx_right − cx_left in pixels.
 
     Returns: (...), in pixels; NaN at and behind the cameras.
@@ -56,15 +52,11 @@ def disparity_from_depth(depth: ArrayLike, focal_length: float, baseline: Metres
     return focal_length * baseline / np.where(Z > 0, Z, np.nan) - doffs
 
 
-def depth_error(depth: ArrayLike, focal_length: float, baseline: Metres, disparity_error: float = 0.5) -> Array:
+def depth_error(
+    depth: DepthsLike, focal_length: PixelLength, baseline: Metres, disparity_error: PixelLength = 0.5
+) -> Depths:
     """The error of depth that an error of disparity makes, to first order: ΔZ = Z² Δd / (f B).
 
-    Args:
-        depth: (...), Z in metres.
-        focal_length: f in pixels.
-        disparity_error: Δd in pixels.
-
-    Returns: (...), in metres.
     Source: D. Gallup et al., Variable baseline/resolution stereo, CVPR 2008.
 
     Five times as far, 25 times as uncertain:
@@ -76,14 +68,9 @@ def depth_error(depth: ArrayLike, focal_length: float, baseline: Metres, dispari
 
 
 def depth_interval(
-    depth: ArrayLike, focal_length: float, baseline: Metres, disparity_error: float = 0.5
+    depth: DepthsLike, focal_length: PixelLength, baseline: Metres, disparity_error: PixelLength = 0.5
 ) -> tuple[Array, Array]:
     """The nearest and farthest depths that an error of disparity allows: exact, where `depth_error` is not.
-
-    Args:
-        depth: (...), in metres.
-        focal_length: In pixels.
-        disparity_error: Either way, in pixels.
 
     Returns:
         nearest: (...), in metres.
@@ -131,11 +118,8 @@ class RectifiedPair:
         """B in metres."""
         return float(np.linalg.norm(self.right.centre - self.left.centre))
 
-    def depth(self, disparity: DisparitiesLike) -> Array:
-        """Depths Z = f B / d of disparities.
-
-        Returns: (...), in metres, as `depth_from_disparity` gives them.
-        """
+    def depth(self, disparity: DisparitiesLike) -> Depths:
+        """Depths Z = f B / d of disparities."""
         return depth_from_disparity(disparity, self.focal_length, self.baseline)
 
     def maps(self) -> tuple[Array, Array]:
