@@ -23,6 +23,7 @@ Rays = Annotated[Array, "(..., 3), directions of length 1."]
 Vectors = Annotated[Array, "(..., 3), vectors, of any length and unit."]
 VectorsLike = Annotated[ArrayLike, "(..., 3), vectors, of any length and unit."]
 RaysLike = Annotated[ArrayLike, "(..., 3), directions of any length and unit."]
+UnitRaysLike = Annotated[ArrayLike, "(..., 3), directions of length 1."]
 VectorLike = Annotated[ArrayLike, "(3,), one point or vector in metres."]
 Pixels = Annotated[Array, "(..., 2), pixels (u, v), whose centres are integers."]
 PixelsLike = Annotated[ArrayLike, "(..., 2), pixels (u, v), whose centres are integers."]
@@ -40,7 +41,7 @@ Mask = Annotated[NDArray[np.bool_], "(...), True where it holds; a NaN that is a
 DisparitiesLike = Annotated[ArrayLike, "(...), disparities u_left − u_right in pixels."]
 Depths = Annotated[Array, "(...), depths or distances in metres."]
 DepthsLike = Annotated[ArrayLike, "(...), depths or distances in metres."]
-AnglesLike = Annotated[ArrayLike, "(...), angles from the axis in radians."]
+AnglesLike = Annotated[ArrayLike, "(...), angles in radians from the axis z, longitudes to the right of it."]
 
 # Optics
 Millimetres = Annotated[Array, "(...), lengths in mm."]

@@ -99,6 +99,7 @@ class Openings:
         Args:
             width: Over the distance between places, 0 … 1.
 
+        Returns: Linear light; at width 0 the pinholes themselves.
         Raises: ValueError for a width outside 0 … 1.
         """
         if not 0 <= width <= 1:

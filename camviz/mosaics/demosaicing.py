@@ -1,6 +1,7 @@
 """Demosaicing: a picture (height, width, 3) from a mosaic (height, width), by interpolating what was not measured.
 
-`nearest` and `bilinear` take any pattern; `malvar`, `edge_aware` and `menon` are written for Bayer's. None of them cuts
+`nearest` and `bilinear` take any pattern; `malvar`, `edge_aware` and `menon` are written for Bayer's, of
+at least 4 × 4 pixels. None of them cuts
 off values below 0 or above 1. What a pixel measured stays as it is; under RGBW, what the white ones measured.
 """
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from camviz.cameras import Intrinsics
 from camviz.lenses import Equirectangular
-from camviz.lenses.arrays import AnglesLike, LinearPicture32, RaysLike
+from camviz.lenses.arrays import AnglesLike, LinearPicture32, UnitRaysLike
 from camviz.lenses.base import Array, unit
 from camviz.scenes import Scene
 
@@ -123,7 +123,7 @@ class Ring:
         off_seam = side / np.hypot(side / Z, 1 - self.radius * np.cos(self.half_angle) / Z)  # Z sin ψ, for Z = ∞ too
         return 2 * (np.arctan2(side, ahead) - np.arcsin(off_seam / stitched))
 
-    def rays(self, directions: RaysLike, stitched: float, camera: ArrayLike | None = None) -> tuple[Array, Array]:
+    def rays(self, directions: UnitRaysLike, stitched: float, camera: ArrayLike | None = None) -> tuple[Array, Array]:
         """The rays of cameras that stand in for rays from the middle.
 
         Args:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import Lens
-from camviz.lenses.arrays import LinearPicture32, PointsLike, RaysLike
+from camviz.lenses.arrays import LinearPicture32, PointsLike, UnitRaysLike
 from camviz.lenses.base import Array, as_points
 from camviz.scenes.batched import Indices, Traced, batched
 from camviz.scenes.intersection import Hit
@@ -50,7 +50,7 @@ class Scene:
     surfaces: Sequence[Surface]
     sky: Texture = field(default_factory=lambda: Texture.plain((0.62, 0.72, 0.82)))
 
-    def trace(self, origins: PointsLike, directions: RaysLike, spread: float = 0.0) -> tuple[Floats, Floats]:
+    def trace(self, origins: PointsLike, directions: UnitRaysLike, spread: float = 0.0) -> tuple[Floats, Floats]:
         """Follow rays to the nearest surface.
 
         A ray that meets nothing shows the sky. A direction that is NaN is no ray, and shows a neutral grey.

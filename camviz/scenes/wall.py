@@ -26,6 +26,8 @@ LAMP = (1.02, -0.40, 1.85)
 def wall_scene() -> Scene:
     """The garden's wall, 2.4 m away and square to a camera at the origin, with a lamp, a picture and a ball before it.
 
+    Always the same one; y points down, in metres.
+
     A camera that sees 90° across sees the wall from border to border, and the coping above it:
 
     >>> wall_scene().trace((0, 0, 0), np.array([0, -0.52, 1]) / np.hypot(0.52, 1))[1].round(1)

@@ -51,8 +51,8 @@ def of_arrays(value: Any) -> list[str]:
     """What the names for arrays in a function's signature say of shape and unit, as a field below its docstring.
 
     >>> import camviz
-    >>> of_arrays(camviz.Intrinsics.to_pixels)[-3:]
-    ['    * ``ImagePointsLike`` – (..., 2), points (x, y), distorted or ideal, in focal lengths.', '']
+    >>> of_arrays(camviz.Intrinsics.to_pixels)[-2:]
+    ['    * ``Pixels`` – (..., 2), pixels (u, v), whose centres are integers.', '']
     """
     try:
         said = inspect.signature(value)
