@@ -213,7 +213,7 @@ def epipolar_lines(F: MatrixLike, uv_left: PixelsLike) -> Array:
 
     In a rectified pair it is the row v = 50:
 
-    >>> epipolar_lines([[0, 0, 0], [0, 0, -1], [0, 1, 0]], [100, 50])
+    >>> epipolar_lines([[0, 0, 0], [0, 0, 1], [0, -1, 0]], [100, 50])
     array([  0.,   1., -50.])
     """
     F, x = as_matrix(F, "F"), to_homogeneous(uv_left)
