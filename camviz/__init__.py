@@ -1,7 +1,7 @@
 """camviz: one virtual camera, taken apart piece by piece. This is the map of the house, in reading order.
 
     cameras      intrinsics, a lens and a pose: the virtual camera, and several of them in a rig
-    lenses       from a ray to the image and back, a dozen ways
+    lenses       from a ray to the image and back, a dozen ways; `lenses.arrays`: what `Points`, `Pixels`, `Rays` are
     poses        where a camera stands
     distortion   what a polynomial bends, and where it folds
     twoview      what two cameras know of each other: epipolar geometry, triangulation, rectification

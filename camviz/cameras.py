@@ -14,6 +14,23 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from camviz.lenses import Lens, Perspective
+from camviz.lenses.arrays import (
+    Count,
+    Degrees,
+    ImagePoints,
+    ImagePointsLike,
+    Mask,
+    MatrixLike,
+    Metres,
+    Pixels,
+    PixelsLike,
+    Points,
+    PointsLike,
+    Rays,
+    VectorLike,
+    Vectors,
+    VectorsLike,
+)
 from camviz.lenses.base import Array, as_point, as_points, blocked_matmul, unit
 from camviz.poses import RigidTransform, Rotation
 
@@ -32,10 +49,7 @@ class Intrinsics:
         cx, cy: Principal point in pixels.
         skew: In pixels; 0 where rows and columns are at right angles.
 
-    Raises:
-        ValueError: For a size that is no whole number, a focal length that is not positive, or a number that is not
-            finite.
-
+    Raises: ValueError for a size that is no whole number, a focal length that is not positive, and what is not finite.
     Source: Hartley & Zisserman (2004), eq. 6.10.
 
     >>> grid = Intrinsics(640, 480, fx=500, fy=500, cx=320, cy=240)
@@ -64,16 +78,11 @@ class Intrinsics:
                 raise ValueError(f"{name} must be a finite number of pixels, got {getattr(self, name)}")
 
     @classmethod
-    def from_fov(cls, width: int, height: int, hfov_deg: float) -> Intrinsics:
+    def from_fov(cls, width: Count, height: Count, hfov_deg: Degrees) -> Intrinsics:
         """Square pixels and a centred principal point, seeing `hfov_deg` from the left edge to the right one.
 
         FOV = 2 atan(width / 2f): the field of a perspective lens.
 
-        Args:
-            width, height: Size of the image in pixels.
-            hfov_deg: Horizontal field of view in degrees.
-
-        Returns: Intrinsics with fx = fy.
         Raises: ValueError for a field of view outside (0, 180) degrees.
 
         >>> round(Intrinsics.from_fov(640, 480, 90).fx, 6)  # tan 45° = 1: half the width
@@ -85,15 +94,13 @@ class Intrinsics:
         return cls(width, height, focal_length, focal_length, (width - 1) / 2, (height - 1) / 2)
 
     @classmethod
-    def from_sensor(cls, width: int, height: int, focal_mm: float, pitch_um: float) -> Intrinsics:
+    def from_sensor(cls, width: Count, height: Count, focal_mm: float, pitch_um: float) -> Intrinsics:
         """Square pixels and a centred principal point, from what a data sheet says.
 
         Args:
-            width, height: Size of the image in pixels.
             focal_mm: Focal length in millimetres.
             pitch_um: Distance of neighbouring pixels in micrometres.
 
-        Returns: Intrinsics with fx = fy.
         Raises: ValueError for a pitch or a focal length that is not positive.
 
         >>> Intrinsics.from_sensor(1920, 1080, focal_mm=6, pitch_um=3).fx  # 6 mm / 3 µm
@@ -105,14 +112,9 @@ class Intrinsics:
         return cls(width, height, focal_length, focal_length, (width - 1) / 2, (height - 1) / 2)
 
     @classmethod
-    def from_matrix(cls, K: ArrayLike, width: int, height: int) -> Intrinsics:
+    def from_matrix(cls, K: MatrixLike, width: Count, height: Count) -> Intrinsics:
         """From a camera matrix [[fx, skew, cx], [0, fy, cy], [0, 0, 1]].
 
-        Args:
-            K: (3, 3), the camera matrix in pixels.
-            width, height: Size of the image in pixels.
-
-        Returns: Intrinsics with this K.
         Raises: ValueError for a matrix of any other form.
 
         >>> Intrinsics.from_matrix([[500, 0, 320], [0, 510, 240], [0, 0, 1]], 640, 480).fy
@@ -130,44 +132,24 @@ class Intrinsics:
         """The 3×3 camera matrix."""
         return np.array([[self.fx, self.skew, self.cx], [0, self.fy, self.cy], [0, 0, 1]])
 
-    def to_pixels(self, xy: ArrayLike) -> Array:
-        """Pixels of lens coordinates.
-
-        Args:
-            xy: (..., 2), image points of the lens in focal lengths.
-
-        Returns: (..., 2), pixels.
-        Raises: ValueError where the last axis has not 2 coordinates.
-        """
+    def to_pixels(self, xy: ImagePointsLike) -> Pixels:
+        """Pixels of lens coordinates."""
         xy = as_points(xy, 2, "xy")
         x, y = xy[..., 0], xy[..., 1]
         uv = np.empty(xy.shape)
         uv[..., 0], uv[..., 1] = self.fx * x + self.skew * y + self.cx, self.fy * y + self.cy
         return uv
 
-    def from_pixels(self, uv: ArrayLike) -> Array:
-        """Lens coordinates of pixels: the inverse of `to_pixels`.
-
-        Args:
-            uv: (..., 2), pixels.
-
-        Returns: (..., 2), image points of the lens in focal lengths.
-        Raises: ValueError where the last axis has not 2 coordinates.
-        """
+    def from_pixels(self, uv: PixelsLike) -> ImagePoints:
+        """Lens coordinates of pixels: the inverse of `to_pixels`."""
         uv = as_points(uv, 2, "uv")
         xy = np.empty(uv.shape)
         xy[..., 1] = (uv[..., 1] - self.cy) / self.fy
         xy[..., 0] = (uv[..., 0] - self.cx - self.skew * xy[..., 1]) / self.fx
         return xy
 
-    def contains(self, uv: ArrayLike) -> np.ndarray:
+    def contains(self, uv: PixelsLike) -> Mask:
         """Whether pixels lie on the image.
-
-        Args:
-            uv: (..., 2), pixels.
-
-        Returns: (...) of bool, True on the image; NaN does not lie on it.
-        Raises: ValueError where the last axis has not 2 coordinates.
 
         >>> Intrinsics.from_fov(640, 480, 90).contains([[-0.5, 0], [-0.6, 0], [np.nan, 0]])
         array([ True, False, False])
@@ -175,13 +157,8 @@ class Intrinsics:
         u, v = np.moveaxis(as_points(uv, 2, "uv"), -1, 0)
         return (u >= -0.5) & (u <= self.width - 0.5) & (v >= -0.5) & (v <= self.height - 0.5)
 
-    def resized(self, width: int, height: int) -> Intrinsics:
+    def resized(self, width: Count, height: Count) -> Intrinsics:
         """The same view sampled on another grid: f' = s f and, with centres at integers, c' = s c + (s - 1)/2.
-
-        Args:
-            width, height: Size of the other grid in pixels.
-
-        Returns: Intrinsics of that size, with the same field of view.
 
         >>> Intrinsics(640, 480, 500, 500, 320, 240).resized(320, 240).cx  # 160 - 1/4, not 160
         159.75
@@ -190,35 +167,18 @@ class Intrinsics:
         cx, cy = sx * self.cx + (sx - 1) / 2, sy * self.cy + (sy - 1) / 2
         return Intrinsics(width, height, sx * self.fx, sy * self.fy, cx, cy, sx * self.skew)
 
-    def within(self, side: int) -> Intrinsics:
-        """The same view on the grid of its aspect whose longer side has `side` pixels, and the shorter at least one.
-
-        Args:
-            side: Pixels along the longer side.
-
-        Returns: The view resized.
-        """
+    def within(self, side: Count) -> Intrinsics:
+        """The same view on the grid of its aspect whose longer side has `side` pixels, and the shorter at least one."""
         scale = side / max(self.width, self.height)
         return self.resized(max(1, round(scale * self.width)), max(1, round(scale * self.height)))
 
-    def cropped(self, x0: int, y0: int, width: int, height: int) -> Intrinsics:
-        """The window whose first pixel was (x0, y0): only the principal point moves.
-
-        Args:
-            x0, y0: Column and row in pixels of the window's upper left pixel.
-            width, height: Size of the window in pixels.
-
-        Returns: Intrinsics of the window.
-        """
+    def cropped(self, x0: Count, y0: Count, width: Count, height: Count) -> Intrinsics:
+        """The window whose first pixel was (x0, y0), column and row: only the principal point moves."""
         return replace(self, width=width, height=height, cx=self.cx - x0, cy=self.cy - y0)
 
-    def binned(self, factor: int) -> Intrinsics:
+    def binned(self, factor: Count) -> Intrinsics:
         """Blocks of factor × factor pixels read as one; left-over columns and rows are dropped.
 
-        Args:
-            factor: Pixels along the side of a block.
-
-        Returns: Intrinsics of the smaller image.
         Raises: ValueError for a factor that is no whole number, or below 1.
         """
         if int(factor) != factor or factor < 1:
@@ -226,22 +186,13 @@ class Intrinsics:
         width, height = self.width // factor, self.height // factor
         return self.cropped(0, 0, width * factor, height * factor).resized(width, height)
 
-    def grid(self) -> Array:
-        """Every pixel centre.
-
-        Returns: (height, width, 2), pixels (u, v).
-        """
+    def grid(self) -> Pixels:
+        """Every pixel's centre, (height, width)."""
         u, v = np.meshgrid(np.arange(self.width, dtype=float), np.arange(self.height, dtype=float))
         return np.stack([u, v], axis=-1)
 
-    def border(self, samples: int = 16) -> Array:
-        """The image's outline, clockwise from the top left corner.
-
-        Args:
-            samples: Points along each side.
-
-        Returns: (4 * samples, 2), pixels.
-        """
+    def border(self, samples: Count = 16) -> Pixels:
+        """The image's outline, clockwise from the top left corner: `samples` points along each side."""
         s = np.arange(samples) / samples
         u = np.concatenate([s, np.ones(samples), 1 - s, np.zeros(samples)]) * self.width - 0.5
         v = np.concatenate([np.zeros(samples), s, np.ones(samples), 1 - s]) * self.height - 0.5
@@ -285,14 +236,9 @@ class Camera:
         R.flags.writeable = t.flags.writeable = False
         return R, t
 
-    def project(self, points_world: ArrayLike) -> Array:
+    def project(self, points_world: PointsLike) -> Pixels:
         """K ∘ lens ∘ cam_from_world: where points of the world appear in the picture.
 
-        Args:
-            points_world: (..., 3), points in metres.
-
-        Returns: (..., 2), pixels; NaN where a point has no image.
-        Raises: ValueError where the last axis has not 3 coordinates.
         Source: Hartley & Zisserman (2004), section 6.1.
 
         >>> camera = Camera(Intrinsics.from_fov(641, 481, 90))  # f = 641/2, principal point (320, 240)
@@ -305,14 +251,8 @@ class Camera:
         points_cam = blocked_matmul(as_points(points_world, 3, "points_world"), R.T) + t
         return self.intrinsics.to_pixels(self.lens.project(points_cam))
 
-    def unproject(self, uv: ArrayLike) -> Array:
+    def unproject(self, uv: PixelsLike) -> Rays:
         """The rays through pixels.
-
-        Args:
-            uv: (..., 2), pixels.
-
-        Returns: (..., 3), unit rays in the world, from the camera's centre; NaN where there is no ray.
-        Raises: ValueError where the last axis has not 2 coordinates.
 
         >>> Camera(Intrinsics.from_fov(641, 481, 90)).unproject([320, 240])
         array([0., 0., 1.])
@@ -320,48 +260,24 @@ class Camera:
         R, _ = self.extrinsics
         return blocked_matmul(self.lens.unproject(self.intrinsics.from_pixels(uv)), R)
 
-    def rays(self) -> Array:
-        """The ray of every pixel.
-
-        Returns: (height, width, 3), unit rays in the world; NaN where there is no ray.
-        """
+    def rays(self) -> Rays:
+        """The ray in the world of every pixel, (height, width)."""
         return self.unproject(self.intrinsics.grid())
 
-    def sees(self, points_world: ArrayLike) -> np.ndarray:
-        """Whether points of the world have an image inside the picture.
-
-        Args:
-            points_world: (..., 3), points in metres.
-
-        Returns: (...) of bool, True where the image lies inside the picture.
-        Raises: ValueError where the last axis has not 3 coordinates.
-        """
+    def sees(self, points_world: PointsLike) -> Mask:
+        """Whether points of the world have an image inside the picture."""
         return self.intrinsics.contains(self.project(points_world))
 
-    def frustum(self, near: float, far: float, samples: int = 16) -> tuple[Array, Array]:
-        """The rims of the viewed volume at two distances.
+    def frustum(self, near: Metres, far: Metres, samples: Count = 16) -> tuple[Points, Points]:
+        """The rims of the viewed volume at two distances, in the world: `samples` points along each side of the image.
 
-        Points of the image's border at equal distance *along the ray*, so the rims bend with the lens.
-
-        Args:
-            near, far: Distances in metres.
-            samples: Points along each side of the image.
-
-        Returns:
-            near_rim: (4 * samples, 3), points in the world in metres, at the distance `near`.
-            far_rim: (4 * samples, 3), the same at `far`.
+        They are at equal distance *along the ray*, so the rims bend with the lens.
         """
         rays = self.unproject(self.intrinsics.border(samples))
         return self.centre + near * rays, self.centre + far * rays
 
     def at(self, world_from_cam: RigidTransform) -> Camera:
-        """The same camera, standing elsewhere.
-
-        Args:
-            world_from_cam: Its new pose.
-
-        Returns: Camera with the same intrinsics and lens.
-        """
+        """The same camera, standing elsewhere."""
         return replace(self, world_from_cam=world_from_cam)
 
 
@@ -390,23 +306,20 @@ class Rig:
         return self.cameras[name]
 
     def a_from_b(self, a: str, b: str) -> RigidTransform:
-        """The transform that takes points in camera b's frame to camera a's; for a stereo pair, right_from_left.
+        """The transform, in metres, that takes points in camera b's frame to camera a's: of a pair, right_from_left.
 
         Args:
             a, b: Names of cameras.
 
-        Returns: RigidTransform in metres.
         Raises: KeyError for a name that is none of the cameras'.
         """
         return self[a].cam_from_world * self[b].world_from_cam
 
 
-def look_at(eye: ArrayLike, target: ArrayLike, down: ArrayLike = (0, 1, 0)) -> RigidTransform:
+def look_at(eye: VectorLike, target: VectorLike, down: ArrayLike = (0, 1, 0)) -> RigidTransform:
     """The pose of a camera that looks at a point.
 
     Args:
-        eye: (3,), where the camera stands, in metres.
-        target: (3,), what it looks at, in metres.
         down: (3,), the direction, of any unit, that its y axis leans towards; y of the world unless given.
 
     Returns: world_from_cam.
@@ -425,15 +338,11 @@ def look_at(eye: ArrayLike, target: ArrayLike, down: ArrayLike = (0, 1, 0)) -> R
     return RigidTransform.from_components(eye, Rotation.from_matrix(axes))
 
 
-def transform(to_from: RigidTransform, points: ArrayLike) -> Array:
-    """Points taken by a rigid transform; SciPy's `apply` takes only (n, 3).
+def transform(to_from: RigidTransform, points: PointsLike) -> Points:
+    """Points taken by one rigid transform; SciPy's `apply` takes only (n, 3).
 
     Args:
-        to_from: One transform, in metres.
-        points: (..., 3), points in metres.
-
-    Returns: (..., 3), the same points in the other frame.
-    Raises: ValueError where the last axis has not 3 coordinates.
+        to_from: In metres.
 
     >>> from camviz.poses import RigidTransform
     >>> transform(RigidTransform.from_translation([1, 0, 0]), [[[0, 0, 2]]])
@@ -443,15 +352,8 @@ def transform(to_from: RigidTransform, points: ArrayLike) -> Array:
     return blocked_matmul(as_points(points, 3, "points"), matrix[:3, :3].T) + matrix[:3, 3]
 
 
-def rotate(rotation: Rotation, vectors: ArrayLike) -> Array:
-    """Vectors turned by a rotation.
-
-    Args:
-        rotation: One rotation.
-        vectors: (..., 3), vectors, of any unit.
-
-    Returns: (..., 3), the turned vectors.
-    Raises: ValueError where the last axis has not 3 coordinates.
+def rotate(rotation: Rotation, vectors: VectorsLike) -> Vectors:
+    """Vectors turned by one rotation.
 
     >>> from camviz.poses import Rotation
     >>> rotate(Rotation.from_euler("y", 90, degrees=True), [0, 0, 1]).round(6)  # forwards turns to the right

@@ -2,7 +2,8 @@
 
 CONTRIBUTING.md ("Docstrings") shows the form. A public name is one in the `__all__` of `camviz` or of a part of it.
 What SciPy makes is documented by SciPy, and a module by its parts. A type that is only another name for types needs no
-example, and a constant is documented by the string below it.
+example, and a constant is documented by the string below it. A parameter or a result whose type is a name for arrays,
+such as `Pixels`, is documented by what that name says; a parameter that is called as one of our classes, by the class.
 """
 
 import ast
@@ -26,6 +27,7 @@ import pytest
 from docutils.core import publish_doctree
 
 import camviz
+import camviz.poses
 
 matplotlib.use("agg")
 
@@ -105,6 +107,40 @@ def is_alias(value):
     return isinstance(value, (types.GenericAlias, types.UnionType)) or typing.get_origin(value) is not None
 
 
+def said_by(alias):
+    """What a name for arrays says of their shape and unit; "" of everything else."""
+    return alias.__metadata__[0] if typing.get_origin(alias) is typing.Annotated else ""
+
+
+@functools.cache
+def offered_aliases():
+    """The names for arrays that a part offers, and what each says; a reader finds them on the part's page."""
+    saying = [importlib.import_module(part) for part in PARTS if "Annotated[" in sources()[part]]
+    found = [(name, getattr(part, name)) for part in saying for name in part.__all__]
+    return {name: (value, said_by(value)) for name, value in found if said_by(value)}
+
+
+def of_alias(function, annotation):
+    """What an annotation says of itself, if it is a name for arrays that the function's module takes from a part."""
+    alias, said = offered_aliases().get(annotation, (None, ""))
+    module = sys.modules[inspect.unwrap(function).__module__]
+    return said if said and vars(module).get(annotation) is alias else ""
+
+
+def is_one_of_ours(function, annotation):
+    """Whether an annotation is a documented class of ours, or SciPy's that `camviz.poses` offers, by its bare name."""
+    value = vars(sys.modules[inspect.unwrap(function).__module__]).get(annotation.strip("'\""))
+    ours = inspect.isclass(value) and value.__module__.partition(".")[0] in PACKAGES and bool(value.__doc__)
+    return ours or value in (camviz.poses.RigidTransform, camviz.poses.Rotation)
+
+
+def is_named_after(name, annotation):
+    """Whether a parameter is called as its class, `camera: Camera`, or as the frames of a transform, `a_from_b`."""
+    if annotation == "RigidTransform":
+        return re.fullmatch(r"\w+_from_\w+", name) is not None
+    return name == re.sub("(?<=[a-z])(?=[A-Z])", "_", annotation).lower()
+
+
 def is_of(part, name, value):
     """Whether a name is a part's own: it may be in the `__all__` of others, and is asked for once."""
     module = getattr(value, "__module__", None) or part
@@ -120,6 +156,8 @@ def faults(part, name):
         return []
     if inspect.ismodule(value) or getattr(value, "__module__", "camviz").partition(".")[0] in ("scipy", "numpy"):
         return []
+    if said := said_by(value):
+        return without_shape_or_unit(name, said) + ([] if said.endswith(".") else ["it does not end with a period"])
     if is_alias(value) or not is_documented_by_itself(value):
         text = constant_docstring(part, name)
         lacks = [] if text else ["no string stands below it"]
@@ -266,8 +304,13 @@ def of_results(value, text):
     returned = str(inspect.signature(value).return_annotation)
     title = "Yields" if inspect.isgeneratorfunction(inspect.unwrap(value)) else "Returns"
     said = entries(text, title)
+    if not said and title == "Returns":
+        each = results(returned) if returned.startswith("tuple[") else [returned]
+        is_said = all(of_alias(value, one) for one in each) or is_one_of_ours(value, returned)
+        is_said = is_said or (returned == "bool" and text.startswith("Whether "))
+        return [] if is_said or returned in ("None", "NoReturn") else ["it has no section Returns"]
     if not said:
-        return [] if returned in ("None", "NoReturn") else [f"it has no section {title}"]
+        return [f"it has no section {title}"]
     each = results(returned) if len(said) > 1 else [returned]
     if len(each) != len(said):
         return [f"{title} says {len(said)} results of {returned}"]
@@ -291,7 +334,12 @@ def of_parameters(value, given, own=types.MappingProxyType({})):
         stars.get(each.kind, "") + name: each for name, each in signature.items() if name not in ("self", "cls")
     }
     said = {**given, **{name: text for name, text in own.items() if name in expected}}
-    found = []
+    types_ = {name: str(each.annotation) for name, each in expected.items()}
+    silent = {name: of_alias(value, its) for name, its in types_.items() if name not in said and of_alias(value, its)}
+    found = [fault for name, text in silent.items() for fault in without_shape_or_unit(name, text)]
+    known = {name for name, its in types_.items() if is_one_of_ours(value, its) and is_named_after(name, its)}
+    known |= {name for name, its in types_.items() if (name, its) == ("rng", "np.random.Generator")}
+    expected = {name: each for name, each in expected.items() if name in said or name not in silent.keys() | known}
     if list(said) != list(expected):
         found.append(f"its parameters are {', '.join(expected)}, and documented are {', '.join(said) or 'none'}")
     for name in [name for name in expected if name in said]:
@@ -299,9 +347,13 @@ def of_parameters(value, given, own=types.MappingProxyType({})):
         if expected[name].annotation is inspect.Parameter.empty:
             found.append(f"nothing says the type of {name}")
         if ARRAY.search(annotation) and "Callable" not in annotation:
-            found += [] if SHAPE.match(said[name]) else [f"{name} is an array, and its shape is not said"]
-            found += [] if UNIT.search(said[name]) else [f"{name} is an array, and its unit is not said"]
+            found += without_shape_or_unit(name, said[name])
     return found
+
+
+def without_shape_or_unit(name, text):
+    found = [] if SHAPE.match(text) else [f"{name} is an array, and its shape is not said"]
+    return found + ([] if UNIT.search(text) else [f"{name} is an array, and its unit is not said"])
 
 
 def unnamed_sources(text):

@@ -32,12 +32,14 @@ import mistakes  # noqa: E402
 import panes  # noqa: E402
 import pictures  # noqa: E402
 import slim_styles  # noqa: E402
+from api_pages import aliases, api_pages  # noqa: E402
 from beside import beside  # noqa: E402
 from course_pages import course_pages, learn  # noqa: E402
 from lesson_page import LessonPage, asked_by, exercise_html  # noqa: E402
 from links import on_site  # noqa: E402
 from scripts import question_script  # noqa: E402
 
+from camviz.cameras import Camera  # noqa: E402
 from camviz.twoview import ransac_fundamental  # noqa: E402
 from camviz.views.frustum import FrustumView  # noqa: E402
 from camviz.widgets import explore  # noqa: E402
@@ -48,6 +50,7 @@ from camviz_school.course.material import lesson_paths  # noqa: E402
 from camviz_school.views.pinhole import PinholeView  # noqa: E402
 
 LESSONS = lesson_paths()
+PIXELS = "(..., 2), pixels (u, v), whose centres are integers."
 PAGES = frozenset(path.relative_to(ROOT).as_posix() for path in [*LESSONS, *(ROOT / "docs").glob("*.md")])
 
 
@@ -299,6 +302,17 @@ def test_a_page_of_the_reference_shows_every_section_of_a_docstring():
     assert said["Source"] == "Hartley & Zisserman (2004), algorithm 11.4 and eq. 4.18."
 
 
+def test_a_page_of_the_reference_shows_what_the_names_for_arrays_say():
+    """A name in a signature says shape and unit on the function's page, and all such names have a page of their own."""
+    lines = inspect.getdoc(Camera.project).split("\n")
+    docstrings._process(None, "method", "camviz.Camera.project", Camera.project, None, lines)
+    said = fields(lines)["Arrays"].split("\n\n")
+    assert said == ["PointsLike – " + aliases("camviz.lenses.arrays")["PointsLike"], "Pixels – " + PIXELS]
+    page = api_pages()["api/camviz.lenses.arrays.md"]
+    assert f"| `Pixels` | {PIXELS} |" in page
+    assert "   Pixels" not in page  # which Sphinx cannot show
+
+
 def test_a_colon_in_what_a_function_returns_and_markup_that_is_mathematics_stay_text():
     said = fields(
         docstrings.as_page(
@@ -311,7 +325,7 @@ def test_a_colon_in_what_a_function_returns_and_markup_that_is_mathematics_stay_
 def test_a_signature_shows_types_as_the_source_writes_them():
     shown = docstrings._signature(None, "function", "", ransac_fundamental)
     assert shown
-    assert shown[0].startswith("(uv_left: ArrayLike, uv_right: ArrayLike, threshold_px: float")
+    assert shown[0].startswith("(uv_left: ArrayLike, uv_right: ArrayLike, threshold_px: PixelLength")
     assert shown[0].endswith("max_samples: int = 5000)")
     assert shown[1] == "tuple[Array, np.ndarray]"
     assert docstrings._signature(None, "method", "", FrustumView.figure)[0].startswith("(")

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from camviz.colour.spaces import D65_XY, adaptation, from_chromaticity, tristimulus
 from camviz.colour.spectra import WAVELENGTHS_NM, as_spectra
+from camviz.lenses.arrays import Gains, LinearColoursLike, SpectrumLike, Xyz
 from camviz.lenses.base import Array, as_points
 
 WHITE = from_chromaticity(D65_XY)
@@ -19,18 +20,16 @@ WHITE.flags.writeable = False
 _STEP_NM = WAVELENGTHS_NM[1] - WAVELENGTHS_NM[0]
 
 
-def response(light: ArrayLike, reflectance: ArrayLike, sensitivity: ArrayLike) -> Array:
+def response(light: SpectrumLike, reflectance: ArrayLike, sensitivity: ArrayLike) -> Array:
     """What the channels of a sensor make of surfaces in a light: Σ light · reflectance · sensitivity · Δλ.
 
     The sum stands for the integral over wavelength. Divide by the response to a perfect white to have shares of it.
 
     Args:
-        light: (81,), its power at WAVELENGTHS_NM, in any unit.
         reflectance: (..., 81), shares 0 … 1; a single number is a grey.
         sensitivity: (81, c), what each of c channels makes of a unit of power.
 
     Returns: (..., c), linear, in the light's units times nanometres.
-    Raises: ValueError for other shapes.
     Source: Szeliski (2022), section 2.3.2.
 
     A grey card of 18 % gives 18 % of white's response in every channel:
@@ -53,17 +52,13 @@ def as_channels(values: ArrayLike, name: str, count: int) -> Array:
     return channels
 
 
-def seen(light: ArrayLike, reflectance: ArrayLike) -> Array:
+def seen(light: SpectrumLike, reflectance: ArrayLike) -> Xyz:
     """XYZ under D65 of surfaces as they look to an eye that has grown used to the light.
 
     This is the truth that a camera's colours are held against. Adaptation is Bradford's, as `adaptation` has it.
 
     Args:
-        light: (81,), its power at WAVELENGTHS_NM, in any unit.
         reflectance: (..., 81), shares 0 … 1.
-
-    Returns: (..., 3), XYZ; Y = 1 is a perfect white.
-    Raises: ValueError for other shapes.
 
     White paper looks white in a light bulb's light too:
 
@@ -76,13 +71,12 @@ def seen(light: ArrayLike, reflectance: ArrayLike) -> Array:
 # White balance --------------------------------------------------------------------------------------------------------
 
 
-def neutral(rgb: ArrayLike) -> Array:
+def neutral(rgb: ArrayLike) -> Gains:
     """The gains that make one colour grey and leave its green.
 
     Args:
         rgb: (3,), linear.
 
-    Returns: (3,), what to multiply red, green and blue by.
     Raises: ValueError where a channel is not above 0.
 
     >>> neutral((0.5, 1.0, 0.8))
@@ -94,13 +88,9 @@ def neutral(rgb: ArrayLike) -> Array:
     return rgb[1] / rgb
 
 
-def grey_world(rgb: ArrayLike) -> Array:
+def grey_world(rgb: LinearColoursLike) -> Gains:
     """The gains that make the mean of all colours grey.
 
-    Args:
-        rgb: (..., 3), linear.
-
-    Returns: (3,), what to multiply red, green and blue by.
     Raises: ValueError where the mean of a channel is not above 0.
     Source: G. Buchsbaum, A spatial processor model for object colour perception, J. Franklin Inst. 310 (1980).
 
@@ -112,14 +102,12 @@ def grey_world(rgb: ArrayLike) -> Array:
     return neutral(as_points(rgb, 3, "rgb").reshape(-1, 3).mean(axis=0))
 
 
-def white_patch(rgb: ArrayLike, percentile: float = 100) -> Array:
+def white_patch(rgb: LinearColoursLike, percentile: float = 100) -> Gains:
     """The gains that make the brightest values of the three channels equal.
 
     Args:
-        rgb: (..., 3), linear.
         percentile: Below 100 it leaves out the few brightest, which may be highlights that are cut off.
 
-    Returns: (3,), what to multiply red, green and blue by.
     Raises: ValueError where the brightest of a channel is not above 0.
     Source: E. H. Land and J. J. McCann, Lightness and retinex theory, J. Opt. Soc. Am. 61 (1971).
 

@@ -50,7 +50,6 @@ def find_chart(picture: NDArray[np.uint8]) -> FoundChart:
     Args:
         picture: (height, width, 3), sRGB bytes, uint8.
 
-    Returns: Where its patches are, and their colours.
     Raises: ValueError where no chart is found, saying what to do; and for an array of another kind.
 
     >>> from camviz.colour.charts import painted, published_srgb

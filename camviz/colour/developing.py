@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from camviz.colour.balance import WHITE, fit_matrix, neutral, response, seen
 from camviz.colour.spaces import SRGB_FROM_XYZ, delta_e_2000, from_srgb, to_lab, to_srgb
 from camviz.colour.spectra import illuminant, reflectances, sensitivities, srgb_primaries
+from camviz.lenses.arrays import LinearColoursLike
 from camviz.lenses.base import Array, as_points
 from camviz.scenes.light import to_encoded, to_linear
 
@@ -76,11 +77,10 @@ def xyz_from_raw(camera: str) -> Array:
     return fit_matrix(shot.raw_chart, shot.true_chart, (shot.white, WHITE))
 
 
-def developed(raw: ArrayLike, gains: ArrayLike, matrix: ArrayLike, *, encoded: bool = False) -> Array:
+def developed(raw: LinearColoursLike, gains: ArrayLike, matrix: ArrayLike, *, encoded: bool = False) -> Array:
     """Linear sRGB of raw colours: the gains, then the matrix.
 
     Args:
-        raw: (..., 3), what the sensor counted, linear.
         gains: (3,), factors of white balance.
         matrix: (3, 3), from the balanced raw colour to sRGB; it acts on columns.
         encoded: Whether both act on values that the screen's curve has bent already, which is the common mistake.

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from camviz.colour.spectra import as_spectra, observer
+from camviz.lenses.arrays import LabLike, LinearColoursLike, SpectrumLike, WhiteLike, Xyz, XyzLike
 from camviz.lenses.base import Array, as_points
 
 D65_XY = (0.3127, 0.3290)  # the white of sRGB (IEC 61966-2-1:1999)
@@ -24,15 +25,12 @@ _KNEE, _SLOPE = 216 / 24389, 24389 / 27  # where L* leaves its cube root for a s
 # From spectra ---------------------------------------------------------------------------------------------------------
 
 
-def tristimulus(light: ArrayLike, reflectance: ArrayLike = 1.0) -> Array:
+def tristimulus(light: SpectrumLike, reflectance: ArrayLike = 1.0) -> Xyz:
     """XYZ of surfaces in a light: X = k Σ light · reflectance · x̄, and so on, with k = 1 / Σ light · ȳ.
 
     Args:
-        light: (..., 81), its power at WAVELENGTHS_NM, in any unit.
         reflectance: (..., 81), shares 0 … 1; by default a perfect white.
 
-    Returns: (..., 3), Y = 1 is a perfect white.
-    Raises: ValueError for another shape.
     Source: CIE 15:2004, Colorimetry, section 7.1.
 
     The white of D65 has X = 0.9504 and Z = 1.0888 (CIE):
@@ -47,14 +45,10 @@ def tristimulus(light: ArrayLike, reflectance: ArrayLike = 1.0) -> Array:
 # Chromaticity ---------------------------------------------------------------------------------------------------------
 
 
-def chromaticity(xyz: ArrayLike) -> Array:
+def chromaticity(xyz: XyzLike) -> Array:
     """CIE (x, y) of XYZ.
 
-    Args:
-        xyz: (..., 3), XYZ on any scale.
-
     Returns: (..., 2), x = X / (X + Y + Z), y = Y / (X + Y + Z); NaN for black, which has none.
-    Raises: ValueError for another shape.
     Source: CIE 15:2004, Colorimetry, section 7.
 
     >>> chromaticity(tristimulus(illuminant("D65"))).round(4)
@@ -89,16 +83,12 @@ for _matrix in (XYZ_FROM_SRGB, SRGB_FROM_XYZ):
     _matrix.flags.writeable = False
 
 
-def to_srgb(xyz: ArrayLike) -> Array:
+def to_srgb(xyz: XyzLike) -> Array:
     """Linear sRGB of XYZ under D65.
-
-    Args:
-        xyz: (..., 3), XYZ; Y = 1 is white.
 
     Returns:
         (..., 3), linear; outside 0 … 1 lies what no sRGB screen can show. `camviz.scenes.to_encoded` has the curve.
 
-    Raises: ValueError for another shape.
     Source: IEC 61966-2-1:1999.
 
     No screen can show this green, for its blue would be below 0:
@@ -109,14 +99,9 @@ def to_srgb(xyz: ArrayLike) -> Array:
     return as_points(xyz, 3, "xyz") @ SRGB_FROM_XYZ.T
 
 
-def from_srgb(rgb: ArrayLike) -> Array:
+def from_srgb(rgb: LinearColoursLike) -> Xyz:
     """XYZ under D65 of linear sRGB: the inverse of `to_srgb`.
 
-    Args:
-        rgb: (..., 3), linear, 1 is full.
-
-    Returns: (..., 3), Y = 1 is white.
-    Raises: ValueError for another shape.
     Source: IEC 61966-2-1:1999.
 
     Red's share of white's brightness is 21 %:
@@ -130,15 +115,10 @@ def from_srgb(rgb: ArrayLike) -> Array:
 # CIELAB and colour difference -----------------------------------------------------------------------------------------
 
 
-def to_lab(xyz: ArrayLike, white: ArrayLike) -> Array:
+def to_lab(xyz: XyzLike, white: WhiteLike) -> Array:
     """CIELAB of XYZ beside a white.
 
-    Args:
-        xyz: (..., 3), XYZ on the white's scale.
-        white: (3,), XYZ of what looks white.
-
     Returns: (..., 3), L* (0 black … 100 white), a*, b*.
-    Raises: ValueError for another shape.
     Source: CIE 15:2004, Colorimetry, section 8.2.1.
 
     Middle grey, L* = 50, reflects 18.4 % of the light:
@@ -152,15 +132,9 @@ def to_lab(xyz: ArrayLike, white: ArrayLike) -> Array:
     return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
 
 
-def from_lab(lab: ArrayLike, white: ArrayLike) -> Array:
+def from_lab(lab: LabLike, white: WhiteLike) -> Xyz:
     """XYZ of CIELAB beside a white: the inverse of `to_lab`.
 
-    Args:
-        lab: (..., 3), CIELAB's L*, a*, b*.
-        white: (3,), XYZ of what looks white.
-
-    Returns: (..., 3), on the white's scale.
-    Raises: ValueError for another shape.
     Source: CIE 15:2004, Colorimetry, section 8.2.1.
 
     >>> from_lab((50, 0, 0), (1, 1, 1)).round(4)  # ((50 + 16) / 116)³
@@ -172,14 +146,10 @@ def from_lab(lab: ArrayLike, white: ArrayLike) -> Array:
     return np.where(f**3 > _KNEE, f**3, (116 * f - 16) / _SLOPE) * np.asarray(white, dtype=float)
 
 
-def delta_e_2000(lab1: ArrayLike, lab2: ArrayLike) -> Array:
+def delta_e_2000(lab1: LabLike, lab2: LabLike) -> Array:
     """ΔE2000 between two CIELAB colours: about 1 is the least that an eye sees side by side.
 
-    Args:
-        lab1, lab2: (..., 3), CIELAB's L*, a*, b*.
-
     Returns: (...), 0 for equal colours.
-    Raises: ValueError for another shape.
     Source: G. Sharma, W. Wu and E. N. Dalal, The CIEDE2000 color-difference formula: implementation notes,
     supplementary test data, and mathematical observations, Color Res. Appl. 30 (2005).
 
@@ -241,13 +211,12 @@ ADAPTATIONS: Mapping[str, Array] = {
 under D65, and XYZ itself, which is the wrong place."""
 
 
-def adaptation(white_from: ArrayLike, white_to: ArrayLike, method: str = "Bradford") -> Array:
+def adaptation(white_from: WhiteLike, white_to: WhiteLike, method: str = "Bradford") -> Array:
     """The matrix that takes XYZ seen beside one white to XYZ that look alike beside another.
 
     M⁻¹ diag(M white_to / M white_from) M: each channel of M is scaled by itself, as von Kries proposed.
 
     Args:
-        white_from, white_to: (3,), their XYZ.
         method: {"Bradford", "von Kries", "XYZ"}, which channels M makes: see ADAPTATIONS.
 
     Returns: (3, 3). It acts on columns.

@@ -13,6 +13,7 @@ from importlib.resources import files
 import numpy as np
 from numpy.typing import ArrayLike
 
+from camviz.lenses.arrays import KelvinLike
 from camviz.lenses.base import Array, as_points
 
 WAVELENGTHS_NM = np.arange(380.0, 781.0, 5.0)
@@ -141,11 +142,10 @@ def gel(strength: float) -> Array:
     return 2 ** (strength * np.exp(-(((WAVELENGTHS_NM - 545) / 60) ** 2)))
 
 
-def planckian(kelvin: ArrayLike, wavelengths_nm: ArrayLike = WAVELENGTHS_NM) -> Array:
+def planckian(kelvin: KelvinLike, wavelengths_nm: ArrayLike = WAVELENGTHS_NM) -> Array:
     """The spectra of glowing black bodies, by Planck's law.
 
     Args:
-        kelvin: (...), temperatures above 0, in kelvin.
         wavelengths_nm: (n,), in nanometres; by default WAVELENGTHS_NM.
 
     Returns: (..., n), relative power, 100 at 560 nm.

@@ -13,17 +13,15 @@ from numpy.typing import ArrayLike
 
 from camviz.colour.spaces import chromaticity
 from camviz.colour.spectra import planckian, whole_observer
+from camviz.lenses.arrays import KelvinLike
 from camviz.lenses.base import Array
 
 LOWEST, HIGHEST = 1000.0, 100_000.0  # kelvin
 FARTHEST = 0.05  # from the locus, in Duv: beyond, a colour temperature says nothing (CIE 15:2004, 9.5)
 
 
-def locus_xy(kelvin: ArrayLike) -> Array:
+def locus_xy(kelvin: KelvinLike) -> Array:
     """The chromaticity of black bodies: the Planckian locus.
-
-    Args:
-        kelvin: (...), temperatures above 0, in kelvin.
 
     Returns: (..., 2), CIE (x, y).
     Raises: ValueError unless every temperature is above 0.

@@ -1,5 +1,7 @@
 """Where a distortion ends: folds, poles, and how far a picture and its undistorted one reach. For any lens."""
 
+from __future__ import annotations
+
 from math import inf, pi, radians, sqrt, tan
 
 import numpy as np
@@ -7,8 +9,9 @@ from numpy.typing import ArrayLike
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import Lens, Perspective
+from camviz.lenses.arrays import FocalLengths, ImagePointsLike
 from camviz.lenses.base import Array
-from camviz.lenses.roots import first_positive_root
+from camviz.lenses.folding import first_positive_root
 
 NEARLY_A_POLE = 0.2  # a denominator below which every error of the numerator is multiplied by more than five
 WIDEST = tan(radians(80))  # beyond 80° a perspective picture is hardly more than stretch
@@ -16,9 +19,6 @@ WIDEST = tan(radians(80))  # beyond 80° a perspective picture is hardly more th
 
 def fold_radius(lens: Lens) -> float:
     """The ideal radius where a lens's radial equation turns back, unless a pole comes before it.
-
-    Args:
-        lens: Any lens.
 
     Returns:
         In the equation's own variable: r in focal lengths on the plane z = 1, or for a fisheye the angle θ in radians;
@@ -34,9 +34,6 @@ def fold_radius(lens: Lens) -> float:
 def fold_angle(lens: Lens) -> float:
     """The angle between the axis and the ray at which a lens folds.
 
-    Args:
-        lens: Any lens.
-
     Returns: In radians; infinity if it never folds.
 
     >>> from camviz.lenses import BrownConrady
@@ -49,9 +46,6 @@ def fold_angle(lens: Lens) -> float:
 def pole_radius(lens: Lens) -> float:
     """The ideal radius where a rational polynomial is infinite, the first positive root of D(r²).
 
-    Args:
-        lens: Any lens.
-
     Returns: In focal lengths; infinity if there is none.
 
     >>> from camviz.lenses import BrownConrady
@@ -63,11 +57,6 @@ def pole_radius(lens: Lens) -> float:
 
 def is_rational(lens: Lens) -> bool:
     """Whether a lens's polynomial is divided by another, so that it may have a pole.
-
-    Args:
-        lens: Any lens.
-
-    Returns: True where it is divided.
 
     >>> from camviz.lenses import BrownConrady
     >>> is_rational(BrownConrady(k1=0.1)), is_rational(BrownConrady(k1=0.1, k4=0.1))
@@ -82,7 +71,6 @@ def weakest_denominator(lens: Lens, radius: float) -> tuple[float, float]:
     A D far below 1 is a near-pole: the polynomial has no root there, yet throws the picture about.
 
     Args:
-        lens: Any lens.
         radius: How far to look, in focal lengths.
 
     Returns:
@@ -104,7 +92,6 @@ def edge_of_field(lens: Lens, azimuth: ArrayLike) -> Array:
     """The angle from the axis to the last ray with an image.
 
     Args:
-        lens: Any lens.
         azimuth: (...), directions in radians, from x towards y.
 
     Returns: (...), angles in radians.
@@ -123,13 +110,8 @@ def edge_of_field(lens: Lens, azimuth: ArrayLike) -> Array:
     return low
 
 
-def image_corner_radius(intrinsics: Intrinsics) -> float:
+def image_corner_radius(intrinsics: Intrinsics) -> FocalLengths:
     """The distance from the principal point to the farthest corner pixel: a *distorted* radius.
-
-    Args:
-        intrinsics: The image.
-
-    Returns: In focal lengths.
 
     >>> from camviz.cameras import Intrinsics
     >>> image_corner_radius(Intrinsics(601, 801, 500, 500, cx=300, cy=400))  # √(300² + 400²) / 500
@@ -141,9 +123,6 @@ def image_corner_radius(intrinsics: Intrinsics) -> float:
 
 def ideal_image_radius(camera: Camera) -> float:
     """The largest tan θ of the rays in front of the camera that arrive on the image's border.
-
-    Args:
-        camera: With any lens.
 
     Returns: In focal lengths on the plane z = 1; NaN if there are none.
 
@@ -159,9 +138,6 @@ def ideal_image_radius(camera: Camera) -> float:
 def image_reach(camera: Camera) -> float:
     """How far an undistorted picture of this camera asks the lens.
 
-    Args:
-        camera: With any lens.
-
     Returns: In focal lengths on the plane z = 1; NaN where nowhere.
 
     >>> from camviz.cameras import Camera, Intrinsics
@@ -171,17 +147,12 @@ def image_reach(camera: Camera) -> float:
     return float(np.nanmax([ideal_image_radius(camera), image_corner_radius(camera.intrinsics)]))
 
 
-def jacobian_determinant(lens: Lens, xy: ArrayLike) -> Array:
+def jacobian_determinant(lens: Lens, xy: ImagePointsLike) -> Array:
     """The determinant of the map from the plane z = 1 to the image; below 0 it mirrors.
 
     By the lens's own Jacobian: of `BrownConrady` exact, beyond its fold as well; of most others good to about 1e-9.
 
-    Args:
-        lens: Any lens.
-        xy: (..., 2), ideal points in focal lengths.
-
     Returns: (...), how many times as large an area becomes.
-    Raises: ValueError where the last axis has not 2 coordinates.
 
     >>> from camviz.lenses import BrownConrady
     >>> jacobian_determinant(BrownConrady(-1 / 3), [[0, 0], [1, 0], [1.2, 0]]).round(3)  # at 1 it folds

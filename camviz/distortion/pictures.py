@@ -1,11 +1,14 @@
 """A distorted picture: what of it is valid, how far its pixels move, and the way there and back. For any lens."""
 
+from __future__ import annotations
+
 import cv2
 import numpy as np
 
 from camviz.cameras import Camera, Intrinsics, rotate
 from camviz.distortion.limits import WIDEST, border_points, ideal_points
 from camviz.lenses import Lens, Perspective
+from camviz.lenses.arrays import Share
 from camviz.lenses.base import Array, on_plane
 from camviz.poses import Rotation
 
@@ -14,7 +17,6 @@ def valid_region(camera: Camera, step_px: int = 1) -> np.ndarray:
     """At which pixels a ray arrives.
 
     Args:
-        camera: With any lens.
         step_px: Only every so many pixels are asked.
 
     Returns: (rows, columns) of bool, True where a ray arrives.
@@ -40,7 +42,6 @@ def displacement(camera: Camera, step_px: float) -> tuple[Array, Array]:
     The grid is centred on the image; the undistorted picture has the camera's own K.
 
     Args:
-        camera: With any lens.
         step_px: Distance of neighbouring points in pixels.
 
     Returns:
@@ -101,7 +102,6 @@ def distort_maps(camera: Camera, source: Intrinsics, lens: Lens | None = None) -
     Needs the inverse of the lens at every output pixel.
 
     Args:
-        camera: Whose lens bends.
         source: Of the ideal picture.
         lens: Of the ideal picture; perspective unless given.
 
@@ -135,16 +135,12 @@ def remap(image: np.ndarray, maps: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
     return cv2.remap(image, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
 
 
-def undistorted_intrinsics(camera: Camera, alpha: float) -> tuple[Intrinsics, tuple[int, int, int, int]]:
+def undistorted_intrinsics(camera: Camera, alpha: Share) -> tuple[Intrinsics, tuple[int, int, int, int]]:
     """Intrinsics, of the camera's size, for its undistorted picture.
 
     alpha = 0 shows the largest upright rectangle without black borders, alpha = 1 every pixel of the photograph, and
     between them the focal lengths and principal points are mixed, as in cv2.getOptimalNewCameraMatrix. Rays beyond a
     fold or 80° from the axis are left out.
-
-    Args:
-        camera: With any lens.
-        alpha: From 0 to 1.
 
     Returns:
         intrinsics: Of the undistorted picture.

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from camviz.cameras import Camera, transform
 from camviz.lenses import Perspective
+from camviz.lenses.arrays import Share, VectorLike
 from camviz.lenses.base import Array, as_point, as_points
 from camviz.poses import RigidTransform
 
@@ -103,13 +104,12 @@ class TexturedMesh:
             raise ValueError(f"picture must be uint8 (height, width, 3), got {self.picture.dtype} {self.picture.shape}")
 
     @classmethod
-    def over(cls, points: ArrayLike, picture: NDArray[np.uint8], opacity: float = 1.0) -> TexturedMesh:
+    def over(cls, points: ArrayLike, picture: NDArray[np.uint8], opacity: Share = 1.0) -> TexturedMesh:
         """The picture over a grid of points, whose rows follow the picture's.
 
         Args:
             points: (m, n, 3), at least 2 × 2, in metres.
             picture: (height, width, 3) of uint8, RGB.
-            opacity: From 0 to 1.
 
         Returns: TexturedMesh of (m - 1) × (n - 1) quads.
         Raises: ValueError for points that are no grid.
@@ -213,7 +213,6 @@ def camera_body(
     point well forward end on a plane, as a pinhole's image does, those of a wider lens on a sphere.
 
     Args:
-        camera: What is drawn.
         depth: How far the volume reaches, in metres.
         image: (height, width, 3) of uint8, RGB, shown at the rim.
         colour: A name from the style sheet.
@@ -242,11 +241,10 @@ def camera_body(
     return [*items, Label(camera.centre, name, f"label {colour}")] if name else items
 
 
-def grid_lines(centre: ArrayLike, size: float, step: float, class_: str = "grid") -> list[Item]:
+def grid_lines(centre: VectorLike, size: float, step: float, class_: str = "grid") -> list[Item]:
     """A ground: lines in the plane y = const.
 
     Args:
-        centre: (3,), in metres.
         size: How far it reaches to each side, in metres.
         step: Distance of the lines in metres.
         class_: Their colour, a name from the style sheet.

@@ -8,6 +8,7 @@ from math import cos, exp, radians, sin, tan
 import numpy as np
 
 from camviz.cameras import Camera, Intrinsics, look_at
+from camviz.lenses.arrays import Count
 
 
 @dataclass(frozen=True)
@@ -42,14 +43,8 @@ class OrbitCamera:
         if not -89 <= self.pitch_deg <= 89:
             raise ValueError(f"pitch_deg must lie between -89 and 89 degrees, got {self.pitch_deg}")
 
-    def camera(self, width: int, height: int) -> Camera:
-        """The pinhole camera through which it sees.
-
-        Args:
-            width, height: Size of the picture in pixels.
-
-        Returns: Camera in place.
-        """
+    def camera(self, width: Count, height: Count) -> Camera:
+        """The pinhole camera through which it sees."""
         yaw, pitch = radians(self.yaw_deg), radians(self.pitch_deg)
         outward = np.array([-sin(yaw) * cos(pitch), -sin(pitch), -cos(yaw) * cos(pitch)])
         f = height / (2 * tan(radians(self.vfov_deg) / 2))
@@ -72,8 +67,6 @@ class OrbitCamera:
 
         Args:
             steps: How many; negative ones lead away.
-
-        Returns: OrbitCamera at another distance.
         """
         return replace(self, distance=min(1e4, max(0.05, self.distance * exp(-0.1 * steps))))
 

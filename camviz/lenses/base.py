@@ -7,22 +7,33 @@ body what the rest of camviz has to know of it. `camviz.lenses` finds the file; 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import fields, replace
 from math import isfinite
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.typing import ArrayLike, NDArray
 
+from camviz.lenses.arrays import (  # noqa: F401
+    Array,
+    Coordinates,
+    ImagePoints,
+    ImagePointsLike,
+    Jacobians,
+    Rays,
+    RaysLike,
+    Vectors,
+    as_point,
+    as_points,
+    blocked_matmul,
+    blockwise,
+    on_plane,
+    unit,
+)
 from camviz.lenses.declarations import CalibrationModel, Example, Fold, Spelling
 
-Array = NDArray[np.float64]
-
 ROUNDING = 1e-12  # how far beyond the rim of its image a point may lie and still be a rounded point of the rim
-ALONE = 1 << 17  # multiplications of a matrix product that OpenBLAS does without threads; they begin at twice as many
-BLOCK = 16384  # points worked on at a time, so that the temporaries stay in the processor's cache
 STEP = np.finfo(float).eps ** (1 / 3)  # where a central difference is exact to STEP², about 4e-11
 NO_DENOMINATOR = Polynomial([1.0])
 
@@ -54,52 +65,21 @@ class Lens(ABC):
     denominator_terms: ClassVar[tuple[str, ...]] = ()  # the parameters a, b … of its `denominator` 1 + a s + b s² + …
     may_mirror: ClassVar[bool] = False  # true where part of the image may be mirrored without a radial fold
 
-    def project(self, points_cam: ArrayLike) -> Array:
-        """The images of camera-frame points.
-
-        Args:
-            points_cam: (..., 3), points or rays, of any unit: only their directions count.
-
-        Returns: (..., 2), image points in focal lengths; NaN where there is none.
-        Raises: ValueError where the last axis has not 3 coordinates.
-        """
+    def project(self, points_cam: RaysLike) -> ImagePoints:
+        """The images of camera-frame points."""
         return blockwise(self.image, as_points(points_cam, 3, "points_cam"), 2)
 
-    def unproject(self, xy: ArrayLike) -> Array:
-        """The rays of image points.
-
-        Args:
-            xy: (..., 2), image points in focal lengths.
-
-        Returns: (..., 3), unit rays; NaN where no ray arrives.
-        Raises: ValueError where the last axis has not 2 coordinates.
-        """
+    def unproject(self, xy: ImagePointsLike) -> Rays:
+        """The rays of image points."""
         return blockwise(self._unit_ray, as_points(xy, 2, "xy"), 3)
 
     @abstractmethod
-    def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
-        """The equation from directions to the image, on coordinates; readers ask `project`.
-
-        Args:
-            x, y, z: (n,), coordinates of camera-frame points, of any unit.
-
-        Returns:
-            x: (n,), image coordinates in focal lengths, to the right.
-            y: (n,), the same downwards.
-        """
+    def image(self, x: Coordinates, y: Coordinates, z: Coordinates) -> tuple[Coordinates, Coordinates]:
+        """The equation from directions to x and y on the image, on coordinates; readers ask `project`."""
 
     @abstractmethod
-    def ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
-        """The equation from the image to directions, on coordinates; readers ask `unproject`.
-
-        Args:
-            x, y: (n,), image coordinates in focal lengths.
-
-        Returns:
-            x: (n,), to the right, of a ray of any length.
-            y: (n,), downwards.
-            z: (n,), forwards.
-        """
+    def ray(self, x: Coordinates, y: Coordinates) -> tuple[Coordinates, Coordinates, Coordinates]:
+        """The equation from the image to x, y, z of a ray of any length; readers ask `unproject`."""
 
     def _unit_ray(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
         x, y, z = self.ray(x, y)
@@ -110,10 +90,7 @@ class Lens(ABC):
 
     @classmethod
     def parameters(cls) -> tuple[str, ...]:
-        """The names of the lens's own parameters.
-
-        Returns: In the order of the constructor.
-        """
+        """The names of the lens's own parameters, in the order of the constructor."""
         return tuple(each.name for each in fields(cls))  # type: ignore[arg-type]
 
     def same_as(self) -> Iterator[tuple[Lens, float]]:
@@ -150,35 +127,19 @@ class Lens(ABC):
 
     # Its derivatives. A lens with a closed form overrides the central differences here.
 
-    def project_unchecked(self, rays: Array) -> Array:
-        """As `project`, also beyond a fold if the equation goes on there: quicker to ask.
-
-        Args:
-            rays: (..., 3), rays, of any unit.
-
-        Returns: (..., 2), image points in focal lengths.
-        """
+    def project_unchecked(self, rays: Vectors) -> ImagePoints:
+        """As `project`, also beyond a fold if the equation goes on there: quicker to ask."""
         return self.project(rays)
 
-    def jacobian(self, xy: ArrayLike) -> Array:
-        """The derivative of the map from the plane z = 1 to the image, good to 1e-9.
-
-        Args:
-            xy: (..., 2), points of the plane z = 1 in focal lengths.
-
-        Returns: (..., 2, 2), ∂image/∂xy, without unit.
-        Raises: ValueError where the last axis has not 2 coordinates.
-        """
+    def jacobian(self, xy: ImagePointsLike) -> Jacobians:
+        """The derivative of the map from the plane z = 1 to the image, good to 1e-9."""
         xy = as_points(xy, 2, "xy")
         step = 6e-6 * (1 + np.linalg.norm(xy, axis=-1))[..., None, None] * np.eye(2)
         ahead, behind = (self.project(on_plane(xy[..., None, :] + sign * step)) for sign in (1, -1))
         return np.swapaxes((ahead - behind) / (2 * step.max(axis=-1, keepdims=True)), -1, -2)
 
-    def ray_jacobian(self, rays: Array) -> Array:
+    def ray_jacobian(self, rays: Rays) -> Array:
         """The derivative ∂xy/∂ray.
-
-        Args:
-            rays: (..., 3), unit rays.
 
         Returns: (..., 2, 3), in focal lengths.
         """
@@ -186,12 +147,11 @@ class Lens(ABC):
         columns = [(self.project_unchecked(rays + to) - self.project_unchecked(rays - to)) / (2 * STEP) for to in moved]
         return np.stack(columns, axis=-1)
 
-    def parameter_jacobian(self, name: str, rays: Array) -> Array:
+    def parameter_jacobian(self, name: str, rays: Rays) -> Array:
         """The derivative ∂xy/∂name; from one side at the end of what the parameter may be.
 
         Args:
             name: One of `parameters()`.
-            rays: (..., 3), unit rays.
 
         Returns: (..., 2), in focal lengths per unit of the parameter.
         """
@@ -213,25 +173,6 @@ class Lens(ABC):
 # What lenses are written with
 
 
-def blockwise(function: Callable[..., tuple[Array, ...]], points: Array, size: int) -> Array:
-    """`function` of the coordinates of points (..., n), whose results become the coordinates of points (..., size).
-
-    What has no answer is NaN without a warning: that is its meaning here.
-    """
-    flat = points.reshape(-1, points.shape[-1])
-    result = np.empty((len(flat), size))
-    with np.errstate(all="ignore"):
-        for start in range(0, len(flat), BLOCK):
-            block = slice(start, start + BLOCK)
-            coordinates = function(*flat[block].T.copy())
-            for i, coordinate in enumerate(coordinates):
-                result[block, i] = coordinate
-            whole = np.isfinite(sum(coordinates))
-            if not whole.all():
-                result[block][~whole] = np.nan
-    return result.reshape(*points.shape[:-1], size)
-
-
 def up_to(limit: float, values: Array) -> Array:
     """`values` as far as `limit`, at which they may arrive rounded; NaN beyond it."""
     return np.where(values <= limit * (1 + ROUNDING), np.minimum(values, limit), np.nan)
@@ -249,46 +190,3 @@ def check_range(name: str, value: float, inside: bool, takes: str) -> None:
     """Raises ValueError saying what the parameter `name` takes, unless its value is `inside`."""
     if not inside:
         raise ValueError(f"{name} must be {takes}, got {value}")
-
-
-def as_points(values: ArrayLike, size: int, name: str) -> Array:
-    """`values` as float64 (..., size). Raises ValueError naming `name` when the last axis has another length."""
-    points = np.asarray(values, dtype=np.float64)
-    if points.ndim == 0 or points.shape[-1] != size:
-        raise ValueError(f"{name} must have shape (..., {size}), got {points.shape}")
-    return points
-
-
-def as_point(values: ArrayLike, name: str, size: int = 3) -> Array:
-    """`values` as float64 (size,). Raises ValueError naming `name` for any other shape."""
-    point = np.asarray(values, dtype=np.float64)
-    if point.shape != (size,):
-        raise ValueError(f"{name} must have shape ({size},), got {point.shape}")
-    return point
-
-
-def on_plane(xy: Array) -> Array:
-    """Directions (..., 3) through points (..., 2) of the plane z = 1."""
-    return np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1)
-
-
-def blocked_matmul(vectors: NDArray[Any], matrix: NDArray[Any]) -> NDArray[Any]:
-    """The products vectors @ matrix, (..., n) times (n, m), some thousands of vectors at a time.
-
-    For more at once OpenBLAS wakes threads, which afterwards wait in a busy loop for tens of milliseconds, on the very
-    core where a browser wants to show the picture.
-    """
-    part = ALONE // matrix.size
-    if vectors.ndim == 1 or vectors[..., 0].size <= part:
-        return np.asarray(vectors @ matrix)
-    flat = vectors.reshape(-1, vectors.shape[-1])
-    product = np.empty((len(flat), matrix.shape[-1]), dtype=np.result_type(vectors, matrix))
-    for start in range(0, len(flat), part):
-        np.matmul(flat[start : start + part], matrix, out=product[start : start + part])
-    return product.reshape(*vectors.shape[:-1], -1)
-
-
-def unit(vectors: Array) -> Array:
-    """Vectors (..., n) scaled to length 1; the zero vector has no direction and becomes NaN."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)

@@ -1,16 +1,18 @@
 """The fisheye with a polynomial: what OpenCV's fisheye module, ROS and Kalibr call "equidistant"."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf, pi, sqrt
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from camviz.lenses.arrays import AnglesLike
 from camviz.lenses.base import Array, check_parameters
 from camviz.lenses.declarations import CalibrationModel, Example, Fold, Spelling
 from camviz.lenses.fisheye import Equidistant, Fisheye
-from camviz.lenses.roots import first_positive_root, solve_rising
+from camviz.lenses.folding import first_positive_root, solve_rising
 
 
 @dataclass(frozen=True)
@@ -72,11 +74,8 @@ class KannalaBrandt(Fisheye):
     def __post_init__(self) -> None:
         check_parameters(self)
 
-    def radial(self, theta: ArrayLike) -> Array:
+    def radial(self, theta: AnglesLike) -> Array:
         """θ_d(θ), also beyond the fold.
-
-        Args:
-            theta: (...), angles from the axis in radians.
 
         Returns: (...), distances from the image's centre in focal lengths.
         """
@@ -84,11 +83,8 @@ class KannalaBrandt(Fisheye):
         s = theta * theta
         return theta * (1 + s * (self.k1 + s * (self.k2 + s * (self.k3 + s * self.k4))))
 
-    def slope(self, theta: ArrayLike) -> Array:
+    def slope(self, theta: AnglesLike) -> Array:
         """The derivative θ_d'(θ); the lens folds where it reaches 0.
-
-        Args:
-            theta: (...), angles from the axis in radians.
 
         Returns: (...), focal lengths per radian.
         """

@@ -6,8 +6,9 @@ from functools import cached_property
 import numpy as np
 
 from camviz.lenses.base import Array, Lens, check_parameters
-from camviz.lenses.brown_conrady import UNBOUNDED, BrownConrady
+from camviz.lenses.brown_conrady import BrownConrady
 from camviz.lenses.declarations import Example, Fold
+from camviz.lenses.folding import UNBOUNDED
 from camviz.lenses.perspective import Perspective
 
 

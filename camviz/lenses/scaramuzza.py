@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from camviz.lenses.base import Array, check_parameters, check_range, up_to
 from camviz.lenses.declarations import Example, Fold
 from camviz.lenses.fisheye import Fisheye
-from camviz.lenses.roots import first_positive_root, solve_rising
+from camviz.lenses.folding import first_positive_root, solve_rising
 
 FARTHEST = 1e4  # focal lengths: no sensor reaches out to there
 

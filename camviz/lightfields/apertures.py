@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from camviz.lenses.arrays import Count
 from camviz.lenses.base import Array
 
 APERTURES = ("full", "round", "half", "ring", "pinhole")
@@ -14,14 +15,13 @@ APERTURES = ("full", "round", "half", "ring", "pinhole")
 """
 
 
-def aperture(shape: str, rows: int, columns: int, v: int | None = None, u: int | None = None) -> Array:
+def aperture(shape: str, rows: Count, columns: Count, v: int | None = None, u: int | None = None) -> Array:
     """A mask of ones and zeros: which views of a grid take part in a picture.
 
     Args:
         shape: {"full", "round", "half", "ring", "pinhole"}. "full" is every view; "round" those within the grid's
             inscribed ellipse, and "ring" the outer part of these; "half" the left half, the middle column included;
             "pinhole" a single view.
-        rows, columns: Of the grid.
         v, u: The row and column of the single view; by default those of the middle.
 
     Returns: (rows, columns), 1.0 for a view that takes part, 0.0 for the others.

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from camviz.lenses.arrays import Metres
 from camviz.lenses.base import Array
 from camviz.scenes.light import to_linear
 
@@ -125,7 +126,7 @@ class LightField:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(inverse >= 0, 1 / np.abs(inverse), np.nan)
 
-    def alpha(self, disparity: ArrayLike, pixel_pitch: float) -> Array:
+    def alpha(self, disparity: ArrayLike, pixel_pitch: Metres) -> Array:
         """Ng's α: how far behind the lens the film of a refocused picture lies, over how far the sensor does.
 
         With image distances F and αF, 1 − 1/α = F (1/z − 1/z_focus), and F = focal_length · pixel_pitch; so
@@ -133,7 +134,6 @@ class LightField:
 
         Args:
             disparity: (...), in pixels a view.
-            pixel_pitch: In metres.
 
         Returns: (...), a ratio, 1 at the focus; NaN where no film would do.
         Source: R. Ng, Fourier slice photography, ACM Trans. Graph. 24 (2005).

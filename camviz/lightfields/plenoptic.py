@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from camviz.lenses.arrays import Count
+
 Pixels = NDArray[Any]
 
 
@@ -89,7 +91,7 @@ def from_mosaic(picture: Pixels, rows: int, columns: int) -> Pixels:
     return np.swapaxes(picture.reshape(rows, height, columns, width, *picture.shape[2:]), 1, 2)
 
 
-def epipolar_plane_image(views: Pixels, row: int, v: int | None = None) -> Pixels:
+def epipolar_plane_image(views: Pixels, row: Count, v: int | None = None) -> Pixels:
     """The slice of a light field at one row of pixels and one row of views, in which every point is a straight line.
 
     For every step of u the point moves by its disparity to the left. Transpose the views' axes, (1, 0, 3, 2), for the
@@ -97,7 +99,6 @@ def epipolar_plane_image(views: Pixels, row: int, v: int | None = None) -> Pixel
 
     Args:
         views: (v, u, height, width, ...), of any kind of number.
-        row: Of pixels.
         v: The row of views; by default that in the middle.
 
     Returns: (u, width, ...), one row for each view.

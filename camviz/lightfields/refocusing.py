@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from camviz.lenses.arrays import LinearPicture32, ViewsLike
 from camviz.lenses.base import Array
 from camviz.lightfields.field import LightField
 from camviz.lightfields.plenoptic import grid_of
@@ -17,7 +18,7 @@ from camviz.scenes.light import to_linear
 Floats = NDArray[np.float32]
 
 
-def refocus(field: LightField, disparity: float, mask: ArrayLike | None = None) -> Floats:
+def refocus(field: LightField, disparity: float, mask: ArrayLike | None = None) -> LinearPicture32:
     """The picture that is sharp where points move by a disparity: shift and sum.
 
     R(x, y) = Σ w_vu L_vu(x − d u, y − d v) / Σ w_vu, with u and v counted from the aperture's middle. Between pixels
@@ -28,7 +29,6 @@ def refocus(field: LightField, disparity: float, mask: ArrayLike | None = None) 
         disparity: In pixels a view; 0 is the focus of the field.
         mask: (rows, columns), the weights w ≥ 0 of the views, such as `aperture` gives; by default all share alike.
 
-    Returns: (height, width, 3), linear light, float32.
     Raises: ValueError for a mask of another shape or with no view in it, and a disparity that is not finite.
     Source: R. Ng, Fourier slice photography, ACM Trans. Graph. 24 (2005).
 
@@ -93,14 +93,13 @@ def _moved(picture: NDArray[np.floating], shift: int, axis: int) -> NDArray[np.f
 # With periodic borders the same thing is exact, in two ways ----------------------------------------------------------
 
 
-def periodic_shift_and_sum(views: ArrayLike, disparity: float) -> Array:
+def periodic_shift_and_sum(views: ViewsLike, disparity: float) -> Array:
     """Shift and sum of views that repeat at their borders, every view counting the same.
 
     Each view is shifted by d (u, v), whole pixels or not, by the phase of its own two-dimensional spectrum: exact for
     what `refocus` interpolates.
 
     Args:
-        views: (v, u, height, width, ...), linear light.
         disparity: In pixels a view.
 
     Returns: (height, width, ...), linear light.
@@ -124,7 +123,7 @@ def periodic_shift_and_sum(views: ArrayLike, disparity: float) -> Array:
     return total / (rows * columns)
 
 
-def fourier_slice(views: ArrayLike, disparity: float) -> Array:
+def fourier_slice(views: ViewsLike, disparity: float) -> Array:
     """The picture of `periodic_shift_and_sum` as a slice of the light field's spectrum, transformed back.
 
     The picture's frequencies k = (k_x, k_y), in cycles per pixel, are found in the four-dimensional spectrum at the
@@ -132,7 +131,6 @@ def fourier_slice(views: ArrayLike, disparity: float) -> Array:
     exact, by the kernel of a grid of so many views.
 
     Args:
-        views: (v, u, height, width, ...), linear light.
         disparity: In pixels a view.
 
     Returns: (height, width, ...), linear light.

@@ -28,7 +28,6 @@ def photograph_field(
     """The light field of a scene around a camera, whose centre is the middle of the aperture.
 
     Args:
-        scene: What is photographed.
         camera: With a perspective lens.
         rows, columns: Of the grid of views, at least 1 each.
         baseline, focus_distance: In metres, as of `LightField`.
@@ -63,7 +62,6 @@ def true_disparity(scene: Scene, camera: Camera, field: LightField) -> NDArray[n
     """The disparity of what the middle of the aperture sees, traced.
 
     Args:
-        scene: What is photographed.
         camera: That of the field.
         field: Its baseline, focal length and focus distance count.
 
@@ -90,7 +88,6 @@ def disparity_of_views(scene: Scene, camera: Camera, field: LightField) -> NDArr
     """The disparity of what each view of a field sees, traced.
 
     Args:
-        scene: What is photographed.
         camera: That of the field.
         field: Its places, focal length and focus distance count.
 

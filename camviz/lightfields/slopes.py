@@ -6,12 +6,13 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from camviz.lenses.arrays import Count
 from camviz.lightfields.field import LightField
 
 Floats = NDArray[np.float32]
 
 
-def disparity_by_sweep(field: LightField, disparities: ArrayLike, window: int = 5) -> Floats:
+def disparity_by_sweep(field: LightField, disparities: ArrayLike, window: Count = 5) -> Floats:
     """Disparity of what the middle of the aperture sees: the shear at which the views agree best.
 
     The cost of a shear is the variance over the sheared views, averaged over a window; a parabola through the least
@@ -21,7 +22,6 @@ def disparity_by_sweep(field: LightField, disparities: ArrayLike, window: int = 
     Args:
         field: The views.
         disparities: (n,), what is tried, in pixels a view: evenly spaced, n ≥ 3.
-        window: Pixels along each side, odd.
 
     Returns: (height, width), in pixels a view, float32.
     Raises: ValueError for fewer than three disparities, unevenly spaced ones, and an even window.
@@ -49,7 +49,7 @@ def disparity_by_sweep(field: LightField, disparities: ArrayLike, window: int = 
     return (tried[best] + between * (tried[1] - tried[0])).astype(np.float32)
 
 
-def disparity_by_structure(field: LightField, start: ArrayLike = 0.0, window: int = 5) -> tuple[Floats, Floats]:
+def disparity_by_structure(field: LightField, start: ArrayLike = 0.0, window: Count = 5) -> tuple[Floats, Floats]:
     """Disparity by the direction of the lines in epipolar-plane images, and how far to trust it.
 
     With L(x, u) = g(x + d u), L_u = d L_x. The structure tensor's eigenvector gives d = tan(½ atan2(2 J_xu, J_xx −
@@ -59,7 +59,6 @@ def disparity_by_structure(field: LightField, start: ArrayLike = 0.0, window: in
     Args:
         field: The views, at least 3 × 3.
         start: scalar, in pixels a view: shear the field there first, for the answer is good within half a pixel of it.
-        window: Pixels along each side, odd.
 
     Returns:
         disparity: (height, width), in pixels a view, float32.

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
+from camviz.lenses.arrays import LinearPicture, MosaicLike
 from camviz.lenses.base import Array
 from camviz.mosaics.demosaicing import bayer_mosaic, by_differences, demosaic
 from camviz.mosaics.patterns import GREEN, Pattern
@@ -18,12 +19,8 @@ BY_DIFFERENCES = ("edge-aware", "Menon")
 """
 
 
-def green_windows(values: ArrayLike, pattern: Pattern) -> Array:
+def green_windows(values: MosaicLike, pattern: Pattern) -> Array:
     """The windows of a Bayer mosaic around its red and blue pixels, mirrored at the border.
-
-    Args:
-        values: (height, width), a mosaic of linear light, at least 4 × 4.
-        pattern: One of BAYER.
 
     Returns: (n, 5, 5), linear light, row by row of the n red and blue pixels.
     Raises: ValueError for a mosaic of another shape, and for other patterns.
@@ -39,18 +36,15 @@ def green_windows(values: ArrayLike, pattern: Pattern) -> Array:
     return windows[~pattern.mask(GREEN, *measured.shape)]
 
 
-def with_green(values: ArrayLike, pattern: Pattern, green: ArrayLike, algorithm: str = "edge-aware") -> Array:
+def with_green(values: MosaicLike, pattern: Pattern, green: ArrayLike, algorithm: str = "edge-aware") -> LinearPicture:
     """The picture of a Bayer mosaic whose green was guessed elsewhere.
 
     Args:
-        values: (height, width), a mosaic of linear light, at least 4 × 4.
-        pattern: One of BAYER.
         green: (n,), linear light at the pixels that `green_windows` names, in its order.
         algorithm: {"edge-aware", "Menon", "nearest", "bilinear", "Malvar"}. Red and blue are made as it makes them:
             green plus the interpolated differences red − green and blue − green for those of BY_DIFFERENCES, from the
             mosaic alone for the others.
 
-    Returns: (height, width, 3), linear light.
     Raises: ValueError for a mosaic of another shape, another number of `green`, and other patterns.
 
     Of a grey picture, true green makes all three colours true:

@@ -1,6 +1,7 @@
 """Demosaicing: a picture (height, width, 3) from a mosaic (height, width), by interpolating what was not measured.
 
-`nearest` and `bilinear` take any pattern; `malvar`, `edge_aware` and `menon` are written for Bayer's. None of them cuts
+`nearest` and `bilinear` take any pattern; `malvar`, `edge_aware` and `menon` are written for Bayer's, of
+at least 4 × 4 pixels. None of them cuts
 off values below 0 or above 1. What a pixel measured stays as it is; under RGBW, what the white ones measured.
 """
 
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import distance_transform_edt
 
+from camviz.lenses.arrays import LinearPicture, MosaicLike
 from camviz.lenses.base import Array
 from camviz.mosaics.patterns import BLUE, GREEN, RED, WHITE, Pattern, as_mosaic
 
@@ -35,15 +37,9 @@ _NEIGHBOURS = np.array([[0.5, 0.0, 0.5]])
 _THREE = np.full((1, 3), 1 / 3)
 
 
-def nearest(values: ArrayLike, pattern: Pattern) -> Array:
+def nearest(values: MosaicLike, pattern: Pattern) -> LinearPicture:
     """Every missing colour copied from the nearest pixel that measured it.
 
-    Args:
-        values: (height, width), a mosaic of linear light.
-        pattern: Any one.
-
-    Returns: (height, width, 3), linear light.
-    Raises: ValueError for a mosaic of another shape.
     Source: Szeliski (2022), section 10.3.1.
 
     >>> nearest([[0.1, 0.2], [0.3, 0.4]], BAYER["RGGB"])[..., RED]
@@ -54,15 +50,9 @@ def nearest(values: ArrayLike, pattern: Pattern) -> Array:
     return _in_rgb({c: measured[_nearest_pixels(pattern, c, *measured.shape)] for c in pattern.present})
 
 
-def bilinear(values: ArrayLike, pattern: Pattern) -> Array:
+def bilinear(values: MosaicLike, pattern: Pattern) -> LinearPicture:
     """Every missing colour as the mean of the pixels around that measured it, weighted by their nearness.
 
-    Args:
-        values: (height, width), a mosaic of linear light.
-        pattern: Any one.
-
-    Returns: (height, width, 3), linear light.
-    Raises: ValueError for a mosaic of another shape.
     Source: Szeliski (2022), section 10.3.1.
 
     A black-and-white edge gets a coloured fringe:
@@ -77,14 +67,9 @@ def bilinear(values: ArrayLike, pattern: Pattern) -> Array:
     return _in_rgb({channel: _spread(measured, pattern, channel) for channel in pattern.present})
 
 
-def malvar(values: ArrayLike, pattern: Pattern) -> Array:
+def malvar(values: MosaicLike, pattern: Pattern) -> LinearPicture:
     """Bilinear interpolation corrected by the second derivative of the measured colour.
 
-    Args:
-        values: (height, width), a mosaic of linear light, at least 4 × 4.
-        pattern: One of BAYER.
-
-    Returns: (height, width, 3), linear light.
     Raises: ValueError for a mosaic of another shape, and for other patterns.
     Source: H. S. Malvar, L. He and R. Cutler, High-quality linear interpolation for demosaicing of Bayer-patterned
     color images, ICASSP 2004.
@@ -107,14 +92,9 @@ def malvar(values: ArrayLike, pattern: Pattern) -> Array:
     return np.moveaxis(planes, 0, -1)
 
 
-def edge_aware(values: ArrayLike, pattern: Pattern) -> Array:
+def edge_aware(values: MosaicLike, pattern: Pattern) -> LinearPicture:
     """Green along the edge, not across it; then bilinear interpolation of red − green and blue − green.
 
-    Args:
-        values: (height, width), a mosaic of linear light, at least 4 × 4.
-        pattern: One of BAYER.
-
-    Returns: (height, width, 3), linear light.
     Raises: ValueError for a mosaic of another shape, and for other patterns.
     Source: J. F. Hamilton and J. E. Adams, US patent 5,629,734 (1997), for the choice of green.
 
@@ -139,14 +119,9 @@ def by_differences(values: ArrayLike, pattern: Pattern, green: Array) -> Array:
     return np.stack([green + _spread(difference, pattern, c) if c != GREEN else green for c in range(3)], axis=-1)
 
 
-def menon(values: ArrayLike, pattern: Pattern) -> Array:
+def menon(values: MosaicLike, pattern: Pattern) -> LinearPicture:
     """Green both ways, and afterwards the way that left the smoother colours; then refined.
 
-    Args:
-        values: (height, width), a mosaic of linear light, at least 4 × 4.
-        pattern: One of BAYER.
-
-    Returns: (height, width, 3), linear light.
     Raises: ValueError for a mosaic of another shape, and for other patterns.
     Source: D. Menon, S. Andriani and G. Calvagno, Demosaicing with directional filtering and a posteriori decision,
     IEEE Trans. Image Process. 16 (2007).
@@ -177,7 +152,6 @@ def opencv(values: NDArray[np.uint8] | NDArray[np.uint16], pattern: Pattern, met
 
     Args:
         values: (height, width), a mosaic of linear light as uint8 or uint16.
-        pattern: One of BAYER.
         method: {"bilinear", "EA", "VNG"}. "EA" is edge-aware in green only; "VNG" takes uint8 only.
 
     Returns: (height, width, 3), linear light, of the same integer type.
@@ -221,12 +195,10 @@ ANY_PATTERN = ("nearest", "bilinear")
 """
 
 
-def demosaic(values: ArrayLike, pattern: Pattern, algorithm: str = "Menon") -> Array:
+def demosaic(values: MosaicLike, pattern: Pattern, algorithm: str = "Menon") -> Array:
     """A picture from a mosaic, by interpolating what was not measured.
 
     Args:
-        values: (height, width), a mosaic of linear light.
-        pattern: The filters.
         algorithm: {"nearest", "bilinear", "Malvar", "edge-aware", "Menon"}, one of ALGORITHMS.
 
     Returns: (height, width, 3), linear light; values below 0 and above 1 are not cut off.

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from camviz.lenses.arrays import ScreenPictureLike, Share
 from camviz.scenes.light import to_linear
 
 Values = NDArray[np.float32]
@@ -43,13 +44,9 @@ class Measures(NamedTuple):
         return float(self.colour_error.mean())
 
 
-def compare(picture: ArrayLike, truth: ArrayLike) -> Measures:
+def compare(picture: ScreenPictureLike, truth: ScreenPictureLike) -> Measures:
     """All measures of a demosaiced picture against the truth.
 
-    Args:
-        picture, truth: (height, width, 3), as shown on a screen: sRGB 0 … 1, or bytes.
-
-    Returns: PSNR, colour error of each pixel, and zippers.
     Raises: ValueError for pictures of different sizes.
 
     Stripes where the truth is flat are right in colour, and zippers everywhere:
@@ -64,11 +61,8 @@ def compare(picture: ArrayLike, truth: ArrayLike) -> Measures:
     return Measures(_decibels(given, true), _colour_error(*seen), _zipper(*seen))
 
 
-def psnr(picture: ArrayLike, truth: ArrayLike) -> float:
+def psnr(picture: ScreenPictureLike, truth: ScreenPictureLike) -> float:
     """Peak signal-to-noise ratio, 10 log10(1 / mean squared error).
-
-    Args:
-        picture, truth: (height, width, 3), as shown on a screen: sRGB 0 … 1, or bytes.
 
     Returns: In dB; infinite for equal pictures.
     Raises: ValueError for pictures of different sizes.
@@ -81,11 +75,8 @@ def psnr(picture: ArrayLike, truth: ArrayLike) -> float:
     return _decibels(*_pair(picture, truth))
 
 
-def false_colour(picture: ArrayLike, truth: ArrayLike) -> float:
+def false_colour(picture: ScreenPictureLike, truth: ScreenPictureLike) -> float:
     """Mean distance of the colours in CIELAB's a*b* plane, brightness left aside.
-
-    Args:
-        picture, truth: (height, width, 3), as shown on a screen: sRGB 0 … 1, or bytes.
 
     Returns: 0 where no colour is false.
     Raises: ValueError for pictures of different sizes.
@@ -98,11 +89,8 @@ def false_colour(picture: ArrayLike, truth: ArrayLike) -> float:
     return float(colour_error(picture, truth).mean())
 
 
-def colour_error(picture: ArrayLike, truth: ArrayLike) -> Values:
+def colour_error(picture: ScreenPictureLike, truth: ScreenPictureLike) -> Values:
     """The distance of each pixel's colours in CIELAB's a*b* plane: sqrt(Δa*² + Δb*²).
-
-    Args:
-        picture, truth: (height, width, 3), as shown on a screen: sRGB 0 … 1, or bytes.
 
     Returns: (height, width), 0 where the colour is true, float32.
     Raises: ValueError for pictures of different sizes.
@@ -116,16 +104,12 @@ def colour_error(picture: ArrayLike, truth: ArrayLike) -> Values:
     return _colour_error(*(lab(one) for one in _pair(picture, truth)))
 
 
-def zipper(picture: ArrayLike, truth: ArrayLike) -> float:
+def zipper(picture: ScreenPictureLike, truth: ScreenPictureLike) -> Share:
     """The share of pixels whose contrast to their likest neighbour changed by more than can be noticed.
 
     For each pixel, that of its eight neighbours is sought which is nearest to it in the *true* picture.
     It counts where the ΔE*ab of the two differs by more than 2.3 between picture and truth.
 
-    Args:
-        picture, truth: (height, width, 3), as shown on a screen: sRGB 0 … 1, or bytes.
-
-    Returns: 0 … 1.
     Raises: ValueError for pictures of different sizes.
     Source: W. Lu and Y.-P. Tan, Color filter array demosaicking: new method and performance measures, IEEE Trans. Image
     Process. 12 (2003).

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from camviz.lenses.arrays import Count, LinearPicture, LinearPictureLike, MosaicLike, Share
 from camviz.lenses.base import Array
 
 RED = 0
@@ -72,7 +73,6 @@ class Pattern:
             name: For readers.
             rows: The tile's rows with blanks between them: "RG GB".
 
-        Returns: Pattern with that tile.
         Raises: ValueError for letters other than R, G, B and W, and rows of different lengths.
         """
         if not rows.split() or set(rows) - set(LETTERS + " "):
@@ -104,21 +104,16 @@ class Pattern:
         """Whether it is one of the four phases of Bayer's array."""
         return self.tile in {pattern.tile for pattern in BAYER.values()}
 
-    def share(self, channel: int) -> float:
+    def share(self, channel: int) -> Share:
         """The share of pixels that measure a channel.
 
         Args:
             channel: RED, GREEN, BLUE or WHITE.
-
-        Returns: 0 … 1.
         """
         return sum(row.count(channel) for row in self.tile) / (self.height * self.width)
 
-    def channels(self, height: int, width: int) -> NDArray[np.uint8]:
+    def channels(self, height: Count, width: Count) -> NDArray[np.uint8]:
         """The channel that each pixel of a sensor measures.
-
-        Args:
-            height, width: Of the sensor, in pixels.
 
         Returns: (height, width), RED, GREEN, BLUE or WHITE, uint8.
         """
@@ -126,12 +121,11 @@ class Pattern:
         repeats = (-(-height // self.height), -(-width // self.width))
         return np.tile(tile, repeats)[:height, :width]
 
-    def mask(self, channel: int, height: int, width: int) -> NDArray[np.bool_]:
+    def mask(self, channel: int, height: Count, width: Count) -> NDArray[np.bool_]:
         """Whether each pixel of a sensor measures a channel.
 
         Args:
             channel: RED, GREEN, BLUE or WHITE.
-            height, width: Of the sensor, in pixels.
 
         Returns: (height, width), True where it does.
         """
@@ -153,15 +147,11 @@ class Pattern:
         return next(known, Pattern(f"{self.name} from ({x0}, {y0})", tile))
 
 
-def mosaic(picture: ArrayLike, pattern: Pattern) -> Array:
+def mosaic(picture: LinearPictureLike, pattern: Pattern) -> Array:
     """What a sensor under a pattern measures of a picture: one channel a pixel.
 
     A white pixel answers (R + G + B)/3: all channels are scaled so that white light reads the same in each. (On a real
     sensor it gathers about three times as many photons, which is why it is there.)
-
-    Args:
-        picture: (height, width, 3), linear light.
-        pattern: The filters.
 
     Returns: (height, width), linear light; float32 if the picture is, otherwise float64.
     Raises: ValueError for a picture of another shape.
@@ -180,15 +170,8 @@ def mosaic(picture: ArrayLike, pattern: Pattern) -> Array:
     return measured
 
 
-def in_colour(values: ArrayLike, pattern: Pattern) -> Array:
+def in_colour(values: MosaicLike, pattern: Pattern) -> LinearPicture:
     """A mosaic as a picture: each pixel in its filter's colour, white ones grey.
-
-    Args:
-        values: (height, width), linear light, as `mosaic` gives it.
-        pattern: The filters.
-
-    Returns: (height, width, 3), linear light.
-    Raises: ValueError for a mosaic of another shape.
 
     >>> in_colour([[0.1, 0.2], [0.3, 0.4]], BAYER["RGGB"])[0]  # red, and green
     array([[0.1, 0. , 0. ],

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 from scipy.fft import dctn, idctn
 
+from camviz.lenses.arrays import LinearPicture32, LinearPictureLike
 from camviz.lenses.base import Array
 from camviz.mosaics.patterns import BLUE, GREEN, RED, Pattern, as_picture
 
@@ -48,9 +48,6 @@ def carriers(pattern: Pattern) -> tuple[Carrier, ...]:
     The spectrum of a mosaic holds that of the picture's brightness and, moved to these frequencies, those of its
     colours; so fine detail that lies there is taken for colour. A grating at f shows as false colour of the frequency
     f − carrier. For any tile they follow from its discrete Fourier transform.
-
-    Args:
-        pattern: The filters.
 
     Returns: The strongest first, one of f and −f; none for a pattern without colours.
     Source: D. Alleysson, S. Süsstrunk and J. Hérault, Linear demosaicing inspired by the human visual system, IEEE
@@ -108,7 +105,7 @@ def zone_plate(size: int = 256, highest: float = 0.5) -> Array:
     return plate
 
 
-def low_pass(picture: ArrayLike, spots_px: float) -> NDArray[np.float32]:
+def low_pass(picture: LinearPictureLike, spots_px: float) -> LinearPicture32:
     """A picture behind a birefringent filter: each point becomes four spots.
 
     Two plates of quartz do this, one splitting the light to the right and left, one up and down, with a quarter-wave
@@ -117,10 +114,8 @@ def low_pass(picture: ArrayLike, spots_px: float) -> NDArray[np.float32]:
     taken as mirrored at its borders, and as having no detail finer than its pixels.
 
     Args:
-        picture: (height, width, 3), linear light.
         spots_px: How far apart the spots are, d, in pixels; 0 for no filter.
 
-    Returns: (height, width, 3), linear light, float32.
     Raises: ValueError for a picture of another shape, or a distance below 0.
     Source: J. E. Greivenkamp, Color dependent optical prefilter for the suppression of aliasing artifacts, Appl. Opt.
     29 (1990).

@@ -10,18 +10,17 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from camviz.lenses.arrays import MillimetresLike, RatiosLike, RayMatrix
 from camviz.lenses.base import Array
 
 
-def free_space(distance_mm: float) -> Array:
+def free_space(distance_mm: float) -> RayMatrix:
     """The matrix of a way through one medium, [[1, d], [0, 1]]: a ray gains height by its slope.
 
     Args:
         distance_mm: Along the axis.
 
-    Returns: (2, 2). It acts on rays (height in mm, slope).
     Source: E. Hecht, Optics (5th ed. 2017), section 6.2.1.
 
     >>> free_space(10) @ [1, 0.1]  # 1 mm high, rising by 1 in 10
@@ -30,13 +29,12 @@ def free_space(distance_mm: float) -> Array:
     return np.array([[1.0, distance_mm], [0.0, 1.0]])
 
 
-def ideal_lens(focal_mm: float) -> Array:
+def ideal_lens(focal_mm: float) -> RayMatrix:
     """The matrix of a thin lens, [[1, 0], [-1/f, 1]]: a ray loses slope in proportion to its height.
 
     Args:
         focal_mm: The focal length, negative for a lens that spreads light.
 
-    Returns: (2, 2). It acts on rays (height in mm, slope).
     Raises: ValueError for a focal length of 0.
     Source: E. Hecht, Optics (5th ed. 2017), section 6.2.1.
 
@@ -50,14 +48,13 @@ def ideal_lens(focal_mm: float) -> Array:
     return np.array([[1.0, 0.0], [-1 / focal_mm, 1.0]])
 
 
-def refraction(radius_mm: float, before: float, after: float) -> Array:
+def refraction(radius_mm: float, before: float, after: float) -> RayMatrix:
     """The matrix of a spherical surface: Snell's law for small angles.
 
     Args:
         radius_mm: Of the sphere, positive where its centre lies behind the surface, infinite for a flat one.
         before, after: The refractive indices on its two sides.
 
-    Returns: (2, 2). It acts on rays (height in mm, slope).
     Raises: ValueError for a radius of 0.
     Source: E. Hecht, Optics (5th ed. 2017), section 6.2.1.
 
@@ -137,11 +134,10 @@ class Prescription:
         """The second principal plane, behind the *first* surface: image distances count from it."""
         return self.length_mm + self.back_focal_mm - self.focal_mm
 
-    def trace(self, height_mm: ArrayLike, slope: ArrayLike, reach_mm: float = 0.0) -> tuple[Array, Array]:
+    def trace(self, height_mm: MillimetresLike, slope: RatiosLike, reach_mm: float = 0.0) -> tuple[Array, Array]:
         """Rays through the lens, to the back focal point.
 
         Args:
-            height_mm, slope: (...), heights in mm and slopes, as ratios, of the rays where they start.
             reach_mm: Where they start: so far before the first surface.
 
         Returns:

@@ -1,28 +1,33 @@
 """Optical transfer functions of lens and pixel: the share of a grating's contrast that is left, by cycles per mm.
 
 Stages that follow one another multiply: what the lens leaves, the pixel's area reduces again. Diffraction and defocus
-happen in the same opening and do not; `lens_transfer` has both. Every function broadcasts. After J. W. Goodman,
+happen in the same opening and do not; `lens_transfer` has both. Every function broadcasts: `per_mm` is a grating's
+frequency f in cycles per mm, and `f_number` the working one, N. After J. W. Goodman,
 "Introduction to Fourier Optics" (3rd ed. 2005), 6.3-6.4, and H. H. Hopkins, Proc. R. Soc. A 231 (1955).
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.special import j1
 
+from camviz.lenses.arrays import (
+    AnglesLike,
+    FrequenciesLike,
+    MillimetresLike,
+    NanometresLike,
+    RatiosLike,
+    SecondsLike,
+    Shares,
+)
 from camviz.lenses.base import Array
 from camviz.optics.pinhole import GREEN_NM
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(64)
 
 
-def cutoff_per_mm(f_number: ArrayLike, wavelength_nm: ArrayLike = GREEN_NM) -> Array:
+def cutoff_per_mm(f_number: RatiosLike, wavelength_nm: NanometresLike = GREEN_NM) -> Array:
     """The finest grating whose light passes through a round opening at all: 1 / (λ N).
-
-    Args:
-        f_number: (...), the working f-number N, a ratio.
-        wavelength_nm: (...), λ in nanometres.
 
     Returns: (...), in cycles per mm.
     Source: J. W. Goodman, Introduction to Fourier Optics (3rd ed. 2005), section 6.3.
@@ -33,17 +38,13 @@ def cutoff_per_mm(f_number: ArrayLike, wavelength_nm: ArrayLike = GREEN_NM) -> A
     return 1 / (1e-6 * np.asarray(wavelength_nm, dtype=float) * np.asarray(f_number))
 
 
-def diffraction_transfer(per_mm: ArrayLike, f_number: ArrayLike, wavelength_nm: ArrayLike = GREEN_NM) -> Array:
+def diffraction_transfer(
+    per_mm: FrequenciesLike, f_number: RatiosLike, wavelength_nm: NanometresLike = GREEN_NM
+) -> Shares:
     """The share of a grating's contrast that a perfect lens leaves: 2/π (arccos s - s √(1 - s²)) with s = f λ N.
 
     It is the share of a round opening that it has in common with its moved copy.
 
-    Args:
-        per_mm: (...), the grating's frequency f in cycles per mm.
-        f_number: (...), the working f-number N, a ratio.
-        wavelength_nm: (...), λ in nanometres.
-
-    Returns: (...), 1 … 0.
     Source: J. W. Goodman, Introduction to Fourier Optics (3rd ed. 2005), section 6.4.
 
     At half of the cutoff frequency 2/3 - √3/(2π) = 39 % of the contrast is left:
@@ -55,14 +56,10 @@ def diffraction_transfer(per_mm: ArrayLike, f_number: ArrayLike, wavelength_nm: 
     return np.asarray(2 / np.pi * (np.arccos(s) - s * np.sqrt(1 - s**2)))
 
 
-def disc_transfer(per_mm: ArrayLike, diameter_mm: ArrayLike) -> Array:
+def disc_transfer(per_mm: FrequenciesLike, diameter_mm: MillimetresLike) -> Array:
     """The share of a grating's contrast that an even disc of light leaves, as rays out of focus make it.
 
     2 J1(x) / x with x = π f c. Negative where bright and dark lines of a grating change places.
-
-    Args:
-        per_mm: (...), the grating's frequency f in cycles per mm.
-        diameter_mm: (...), of the disc in mm, c.
 
     Returns: (...), 1 … -0.13.
     Source: J. W. Goodman, Introduction to Fourier Optics (3rd ed. 2005), section 6.4.
@@ -77,14 +74,10 @@ def disc_transfer(per_mm: ArrayLike, diameter_mm: ArrayLike) -> Array:
     return np.where(small, 1.0, 2 * j1(x) / np.where(small, 1.0, x))
 
 
-def pixel_transfer(per_mm: ArrayLike, pitch_mm: ArrayLike) -> Array:
+def pixel_transfer(per_mm: FrequenciesLike, pitch_mm: MillimetresLike) -> Array:
     """The share of a grating's contrast that square pixels leave: sin(π f p) / (π f p), along rows or columns.
 
     It is the mean over a pixel that is all sensitive.
-
-    Args:
-        per_mm: (...), the grating's frequency f in cycles per mm.
-        pitch_mm: (...), the pixels' width p in mm.
 
     Returns: (...), 1 … -0.22.
     Source: J. W. Goodman, Introduction to Fourier Optics (3rd ed. 2005), section 6.4.
@@ -98,19 +91,16 @@ def pixel_transfer(per_mm: ArrayLike, pitch_mm: ArrayLike) -> Array:
 
 
 def lens_transfer(
-    per_mm: ArrayLike, f_number: ArrayLike, wavelength_nm: ArrayLike = GREEN_NM, diameter_mm: ArrayLike = 0.0
+    per_mm: FrequenciesLike,
+    f_number: RatiosLike,
+    wavelength_nm: NanometresLike = GREEN_NM,
+    diameter_mm: MillimetresLike = 0.0,
 ) -> Array:
     """The share of a grating's contrast that a perfect lens leaves out of focus: diffraction and defocus together.
 
     (4/π) ∫ √(1 - (x + s)²) cos(π f c x) dx from 0 to 1 - s, with s = f λ N, the overlap of the opening with its moved
     copy, where the waves differ by defocus: c / (8 N) at the rim. At c = 0 it is `diffraction_transfer`, and for λ → 0
     `disc_transfer`. Good to 1e-6 up to f c = 30.
-
-    Args:
-        per_mm: (...), the grating's frequency f in cycles per mm.
-        f_number: (...), the working f-number N, a ratio.
-        wavelength_nm: (...), λ in nanometres.
-        diameter_mm: (...), of the disc that the rays make at the sensor in mm, c.
 
     Returns: (...), 1 or less, negative where bright and dark lines change places.
     Source: H. H. Hopkins, The frequency response of a defocused optical system, Proc. R. Soc. A 231 (1955).
@@ -132,17 +122,13 @@ def lens_transfer(
     return np.asarray(4 / np.pi * np.sum(half * _WEIGHTS * np.cos(angle) ** 2 * np.cos(waves), axis=-1))
 
 
-def unvignetted_share(angle_rad: ArrayLike, aperture_mm: ArrayLike, rim_mm: ArrayLike, distance_mm: ArrayLike) -> Array:
+def unvignetted_share(
+    angle_rad: AnglesLike, aperture_mm: MillimetresLike, rim_mm: MillimetresLike, distance_mm: MillimetresLike
+) -> Shares:
     """The share of the aperture that light from beside the axis can reach past a round rim in front of it.
 
     Seen aslant, the rim's disc moves aside by distance · tan θ. What is left is the overlap of two discs.
 
-    Args:
-        angle_rad: (...), θ, from the axis, in radians.
-        aperture_mm, rim_mm: (...), diameters in mm.
-        distance_mm: (...), from the rim to the aperture in mm.
-
-    Returns: (...), 0 … 1.
     Source: S. F. Ray, Applied Photographic Optics (3rd ed. 2002).
 
     A rim as wide as the aperture, moved by half its width, leaves 2/3 - √3/(2π) = 39 %:
@@ -161,12 +147,8 @@ def unvignetted_share(angle_rad: ArrayLike, aperture_mm: ArrayLike, rim_mm: Arra
     return np.asarray(whole / (np.pi * r**2))
 
 
-def exposure_value(f_number: ArrayLike, shutter_s: ArrayLike) -> Array:
+def exposure_value(f_number: RatiosLike, shutter_s: SecondsLike) -> Array:
     """EV = log2(N² / t): settings of the same EV let the same light fall on the sensor; one more is half of it.
-
-    Args:
-        f_number: (...), N, a ratio.
-        shutter_s: (...), t in seconds.
 
     Returns: (...), in stops.
     Source: S. F. Ray, Applied Photographic Optics (3rd ed. 2002).

@@ -1,6 +1,7 @@
 """The pinhole: its blur, its exposure and its field of view.
 
-Distances in millimetres from the hole, wavelengths in nanometres, times in seconds. Every function broadcasts.
+Every function broadcasts. `diameter_mm` is that of the hole, d; `focal_mm` is from the hole to the wall, f; `object_mm`
+from the hole to the point, Z. Wavelengths λ are in nanometres, times t in seconds.
 """
 
 from __future__ import annotations
@@ -8,9 +9,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.special import j0
 
+from camviz.lenses.arrays import Millimetres, MillimetresLike, Nanometres, Ratios, SecondsLike
 from camviz.lenses.base import Array
 
 GREEN_NM = 550.0
@@ -48,15 +49,10 @@ np.float64(1.0)
 """
 
 
-def geometric_blur_mm(diameter_mm: ArrayLike, focal_mm: ArrayLike, object_mm: ArrayLike = np.inf) -> Array:
+def geometric_blur_mm(
+    diameter_mm: MillimetresLike, focal_mm: MillimetresLike, object_mm: MillimetresLike = np.inf
+) -> Millimetres:
     """The diameter of the hole's shadow of a point: d (Z + f) / Z, by similar triangles.
-
-    Args:
-        diameter_mm: (...), of the hole in mm, d.
-        focal_mm: (...), from the hole to the wall in mm, f.
-        object_mm: (...), from the hole to the point in mm, Z.
-
-    Returns: (...), in mm.
 
     >>> geometric_blur_mm(0.5, focal_mm=100, object_mm=[1000, np.inf])
     array([0.55, 0.5 ])
@@ -64,15 +60,11 @@ def geometric_blur_mm(diameter_mm: ArrayLike, focal_mm: ArrayLike, object_mm: Ar
     return np.asarray(diameter_mm) * (1 + np.asarray(focal_mm) / np.asarray(object_mm))
 
 
-def diffraction_blur_mm(diameter_mm: ArrayLike, focal_mm: ArrayLike, wavelength_nm: float = GREEN_NM) -> Array:
+def diffraction_blur_mm(
+    diameter_mm: MillimetresLike, focal_mm: MillimetresLike, wavelength_nm: Nanometres = GREEN_NM
+) -> Millimetres:
     """The diameter of the Airy disc: 2.44 λ f / d.
 
-    Args:
-        diameter_mm: (...), of the hole in mm, d.
-        focal_mm: (...), from the hole to the wall in mm, f.
-        wavelength_nm: λ.
-
-    Returns: (...), in mm.
     Source: M. Born and E. Wolf, Principles of Optics (7th ed. 1999), section 8.5.2.
 
     A hole half as wide blurs twice as much:
@@ -84,19 +76,14 @@ def diffraction_blur_mm(diameter_mm: ArrayLike, focal_mm: ArrayLike, wavelength_
 
 
 def pinhole_blur_mm(
-    diameter_mm: ArrayLike, focal_mm: ArrayLike, object_mm: ArrayLike = np.inf, wavelength_nm: float = GREEN_NM
-) -> Array:
+    diameter_mm: MillimetresLike,
+    focal_mm: MillimetresLike,
+    object_mm: MillimetresLike = np.inf,
+    wavelength_nm: Nanometres = GREEN_NM,
+) -> Millimetres:
     """The diameter of the image of a point: shadow and Airy disc added in squares.
 
     A rule of thumb for the circle that holds the share of light an Airy disc does, 84 %; `pinhole_spread` is exact.
-
-    Args:
-        diameter_mm: (...), of the hole in mm.
-        focal_mm: (...), from the hole to the wall in mm.
-        object_mm: (...), from the hole to the point in mm.
-        wavelength_nm: Of the light.
-
-    Returns: (...), in mm.
 
     Neither the narrow nor the wide hole is the sharpest:
 
@@ -107,15 +94,14 @@ def pinhole_blur_mm(
     return np.hypot(shadow, diffraction_blur_mm(diameter_mm, focal_mm, wavelength_nm))
 
 
-def best_hole_mm(focal_mm: ArrayLike, wavelength_nm: float = GREEN_NM, constant: float = BALANCE) -> Array:
+def best_hole_mm(
+    focal_mm: MillimetresLike, wavelength_nm: Nanometres = GREEN_NM, constant: float = BALANCE
+) -> Millimetres:
     """The diameter of the sharpest hole for distant objects: c sqrt(f λ).
 
     Args:
-        focal_mm: (...), from the hole to the wall in mm, f.
-        wavelength_nm: λ.
         constant: c: with BALANCE, `pinhole_blur_mm` is least; RAYLEIGH and YOUNG are other ideas of what is sharp.
 
-    Returns: (...), in mm.
     Source: M. Young, Pinhole optics, Applied Optics 10 (1971).
 
     >>> best_hole_mm(100).round(2), best_hole_mm(400).round(2)  # four times as far, twice as wide
@@ -125,7 +111,7 @@ def best_hole_mm(focal_mm: ArrayLike, wavelength_nm: float = GREEN_NM, constant:
 
 
 def fresnel_number(
-    diameter_mm: float, focal_mm: float, object_mm: float = np.inf, wavelength_nm: float = GREEN_NM
+    diameter_mm: float, focal_mm: float, object_mm: float = np.inf, wavelength_nm: Nanometres = GREEN_NM
 ) -> float:
     """How many half wavelengths longer the way past the hole's rim is: a² (1/f + 1/Z) / λ.
 
@@ -133,7 +119,6 @@ def fresnel_number(
         diameter_mm: Of the hole, 2a.
         focal_mm: From the hole to the wall, f.
         object_mm: From the hole to the point, Z.
-        wavelength_nm: λ.
 
     Returns: Far above 1 the image is the hole's shadow, far below an Airy disc.
     Source: M. Young, Pinhole optics, Applied Optics 10 (1971).
@@ -145,22 +130,20 @@ def fresnel_number(
 
 
 def pinhole_spread(
-    radius_mm: ArrayLike,
+    radius_mm: MillimetresLike,
     diameter_mm: float,
     focal_mm: float,
     object_mm: float = np.inf,
-    wavelength_nm: float = GREEN_NM,
+    wavelength_nm: Nanometres = GREEN_NM,
 ) -> Array:
     """Light per mm² beside the middle of a point's image, by Fresnel diffraction at a round hole.
 
     A shadow for a wide hole, an Airy disc for a narrow one, and between them fringes. One wavelength, small angles.
 
     Args:
-        radius_mm: (...), from the middle in mm.
         diameter_mm: Of the hole.
         focal_mm: From the hole to the wall.
         object_mm: From the hole to the point.
-        wavelength_nm: Of the light.
 
     Returns: (...), shares of the light per mm²: over the whole wall they sum to 1.
     Source: M. Born and E. Wolf, Principles of Optics (7th ed. 1999), section 8.8.1.
@@ -188,7 +171,7 @@ def pinhole_kernel(
     diameter_mm: float,
     focal_mm: float,
     object_mm: float = np.inf,
-    wavelength_nm: float = GREEN_NM,
+    wavelength_nm: Nanometres = GREEN_NM,
     many: float = 12.0,
 ) -> Array:
     """The image of a point on pixels, to blur a picture with.
@@ -200,7 +183,6 @@ def pinhole_kernel(
         diameter_mm: Of the hole.
         focal_mm: From the hole to the wall.
         object_mm: From the hole to the point.
-        wavelength_nm: Of the light.
         many: A Fresnel number.
 
     Returns: (n, n), shares of the light that sum to 1; n is odd.
@@ -235,14 +217,8 @@ def pinhole_kernel(
     return pixels / total if total > 0 else np.ones((1, 1))
 
 
-def f_number(diameter_mm: ArrayLike, focal_mm: ArrayLike) -> Array:
+def f_number(diameter_mm: MillimetresLike, focal_mm: MillimetresLike) -> Ratios:
     """The f-number N = f / d.
-
-    Args:
-        diameter_mm: (...), of the hole or the aperture in mm.
-        focal_mm: (...), from the hole to the wall, or the focal length.
-
-    Returns: (...), a ratio.
 
     >>> f_number(0.5, 100)
     np.float64(200.0)
@@ -250,15 +226,10 @@ def f_number(diameter_mm: ArrayLike, focal_mm: ArrayLike) -> Array:
     return np.asarray(focal_mm) / np.asarray(diameter_mm)
 
 
-def sunny_exposure(diameter_mm: ArrayLike, focal_mm: ArrayLike, exposure_s: ArrayLike) -> Array:
+def sunny_exposure(diameter_mm: MillimetresLike, focal_mm: MillimetresLike, exposure_s: SecondsLike) -> Array:
     """Light gathered from a sunlit scene, relative to a correct exposure at ISO 100: in proportion to t d² / f².
 
     By photographers' "sunny 16" rule, f/16 and 1/100 s are correct.
-
-    Args:
-        diameter_mm: (...), of the hole or the aperture in mm, d.
-        focal_mm: (...), from the hole to the wall, or the focal length, f.
-        exposure_s: (...), in seconds, t.
 
     Returns: (...), a ratio, 1 where the exposure is correct.
 
@@ -270,12 +241,8 @@ def sunny_exposure(diameter_mm: ArrayLike, focal_mm: ArrayLike, exposure_s: Arra
     return 100 * np.asarray(exposure_s) * (16 / f_number(diameter_mm, focal_mm)) ** 2
 
 
-def field_of_view_deg(width_mm: ArrayLike, distance_mm: ArrayLike) -> Any:
+def field_of_view_deg(width_mm: MillimetresLike, distance_mm: MillimetresLike) -> Any:
     """The angle that a wall or a sensor sees through a hole or thin lens: 2 atan(width / 2v).
-
-    Args:
-        width_mm: (...), of the wall or sensor in mm.
-        distance_mm: (...), from the hole or lens to it in mm, v.
 
     Returns: array (...), in degrees.
     Source: Szeliski (2022), section 2.1.4.

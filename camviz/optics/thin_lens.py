@@ -1,8 +1,9 @@
 """The thin lens: the place, size, sharpness and brightness of its image.
 
-All distances in millimetres from the lens, positive: an object at u before it, its image at v behind it. Every function
-broadcasts. Equations after E. Hecht, "Optics" (5th ed. 2017), chapter 5, and S. F. Ray, "Applied Photographic Optics"
-(3rd ed. 2002).
+All distances are from the lens and positive: `object_mm` is u, `image_mm` v, `focus_mm` the distance s that the lens is
+focused at, which may be infinite; `focal_mm` is f, `f_number` N, and `circle_mm` the widest disc c that passes for
+sharp. Every function broadcasts. Equations after E. Hecht, "Optics" (5th ed. 2017), chapter 5, and S. F. Ray, "Applied
+Photographic Optics" (3rd ed. 2002).
 """
 
 from __future__ import annotations
@@ -10,16 +11,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from camviz.lenses.arrays import AnglesLike, Millimetres, MillimetresLike, NanometresLike, Ratios, RatiosLike
 from camviz.lenses.base import Array
 from camviz.optics.pinhole import GREEN_NM
 
 
-def image_distance_mm(focal_mm: ArrayLike, object_mm: ArrayLike) -> Array:
+def image_distance_mm(focal_mm: MillimetresLike, object_mm: MillimetresLike) -> Array:
     """Where the image of an object lies: v = 1 / (1/f - 1/u), Gauss's lens equation.
-
-    Args:
-        focal_mm: (...), the focal length f.
-        object_mm: (...), from the object to the lens in mm, u.
 
     Returns:
         (...), in mm behind the lens. Inside the focal length it is negative, the place from which the light seems to
@@ -34,14 +32,9 @@ def image_distance_mm(focal_mm: ArrayLike, object_mm: ArrayLike) -> Array:
         return np.divide(1.0, 1 / np.asarray(focal_mm, dtype=float) - 1 / np.asarray(object_mm, dtype=float))
 
 
-def object_distance_mm(focal_mm: ArrayLike, image_mm: ArrayLike) -> Array:
+def object_distance_mm(focal_mm: MillimetresLike, image_mm: MillimetresLike) -> Millimetres:
     """What a sensor at a distance sees sharp: u = 1 / (1/f - 1/v). The lens equation is its own inverse.
 
-    Args:
-        focal_mm: (...), the focal length f.
-        image_mm: (...), from the lens to the sensor in mm, v.
-
-    Returns: (...), in mm before the lens.
     Source: E. Hecht, Optics (5th ed. 2017), chapter 5.
 
     A lens of 50 mm moved forward by 5 mm:
@@ -52,12 +45,8 @@ def object_distance_mm(focal_mm: ArrayLike, image_mm: ArrayLike) -> Array:
     return image_distance_mm(focal_mm, image_mm)
 
 
-def magnification(focal_mm: ArrayLike, object_mm: ArrayLike) -> Array:
+def magnification(focal_mm: MillimetresLike, object_mm: MillimetresLike) -> Array:
     """How many times as large as the object its image is: m = v / u = f / (u - f); it is upside down.
-
-    Args:
-        focal_mm: (...), the focal length f.
-        object_mm: (...), from the object to the lens in mm, u.
 
     Returns: (...), a ratio; 1 is life size.
     Source: E. Hecht, Optics (5th ed. 2017), chapter 5.
@@ -71,19 +60,12 @@ def magnification(focal_mm: ArrayLike, object_mm: ArrayLike) -> Array:
 
 
 def circle_of_confusion_mm(
-    focal_mm: ArrayLike, f_number: ArrayLike, focus_mm: ArrayLike, object_mm: ArrayLike
-) -> Array:
+    focal_mm: MillimetresLike, f_number: RatiosLike, focus_mm: MillimetresLike, object_mm: MillimetresLike
+) -> Millimetres:
     """The diameter of the disc that a point out of focus makes: f² / (N (s - f)) · abs(u - s) / u.
 
     By similar triangles: the cone behind the lens is f/N wide there, and a point where the sensor cuts it at v(u).
 
-    Args:
-        focal_mm: (...), the focal length f.
-        f_number: (...), N, a ratio.
-        focus_mm: (...), what the lens is focused at in mm, s; infinity, too.
-        object_mm: (...), from the point to the lens in mm, u.
-
-    Returns: (...), in mm.
     Raises: ValueError for a focus inside the focal length.
     Source: S. F. Ray, Applied Photographic Optics (3rd ed. 2002); Szeliski (2022), section 2.2.3.
 
@@ -96,17 +78,11 @@ def circle_of_confusion_mm(
     return f**2 / np.asarray(f_number) * np.abs(1 / s - 1 / np.asarray(object_mm, dtype=float)) / (1 - f / s)
 
 
-def hyperfocal_mm(focal_mm: ArrayLike, f_number: ArrayLike, circle_mm: ArrayLike) -> Array:
+def hyperfocal_mm(focal_mm: MillimetresLike, f_number: RatiosLike, circle_mm: MillimetresLike) -> Millimetres:
     """The nearest focus that keeps infinity sharp: H = f² / (N c) + f.
 
     Focused there, everything from H/2 to infinity is blurred by no more than c.
 
-    Args:
-        focal_mm: (...), the focal length f.
-        f_number: (...), N, a ratio.
-        circle_mm: (...), the widest disc that passes for sharp in mm, c.
-
-    Returns: (...), in mm.
     Source: S. F. Ray, Applied Photographic Optics (3rd ed. 2002).
 
     >>> hyperfocal_mm(50, 10, circle_mm=0.025).round(6)  # 2500 / 0.25 + 50
@@ -117,16 +93,11 @@ def hyperfocal_mm(focal_mm: ArrayLike, f_number: ArrayLike, circle_mm: ArrayLike
         return f**2 / (np.asarray(f_number) * np.asarray(circle_mm)) + f
 
 
-def near_limit_mm(focal_mm: ArrayLike, f_number: ArrayLike, focus_mm: ArrayLike, circle_mm: ArrayLike) -> Array:
+def near_limit_mm(
+    focal_mm: MillimetresLike, f_number: RatiosLike, focus_mm: MillimetresLike, circle_mm: MillimetresLike
+) -> Millimetres:
     """Where sharpness begins: s (H - f) / (H + s - 2f); nearer than this, a point is blurred by more than c.
 
-    Args:
-        focal_mm: (...), the focal length f.
-        f_number: (...), N, a ratio.
-        focus_mm: (...), what the lens is focused at in mm, s; infinity, too.
-        circle_mm: (...), the widest disc that passes for sharp in mm, c.
-
-    Returns: (...), in mm.
     Raises: ValueError for a focus inside the focal length.
     Source: S. F. Ray, Applied Photographic Optics (3rd ed. 2002).
 
@@ -141,14 +112,10 @@ def near_limit_mm(focal_mm: ArrayLike, f_number: ArrayLike, focus_mm: ArrayLike,
         return np.where(np.isinf(H), s, (H - f) / (1 + (H - 2 * f) / s))[()]
 
 
-def far_limit_mm(focal_mm: ArrayLike, f_number: ArrayLike, focus_mm: ArrayLike, circle_mm: ArrayLike) -> Array:
+def far_limit_mm(
+    focal_mm: MillimetresLike, f_number: RatiosLike, focus_mm: MillimetresLike, circle_mm: MillimetresLike
+) -> Array:
     """Where sharpness ends: s (H - f) / (H - s); farther than this, a point is blurred by more than c.
-
-    Args:
-        focal_mm: (...), the focal length f.
-        f_number: (...), N, a ratio.
-        focus_mm: (...), what the lens is focused at in mm, s.
-        circle_mm: (...), the widest disc that passes for sharp in mm, c.
 
     Returns: (...), in mm; infinite from s = H on.
     Raises: ValueError for a focus inside the focal length.
@@ -166,14 +133,9 @@ def far_limit_mm(focal_mm: ArrayLike, f_number: ArrayLike, focus_mm: ArrayLike, 
     return np.where(np.isinf(H), s, limit)[()]
 
 
-def working_f_number(f_number: ArrayLike, magnification: ArrayLike) -> Array:
+def working_f_number(f_number: RatiosLike, magnification: RatiosLike) -> Ratios:
     """The image's distance over the aperture's width, which is what the sensor sees: N (1 + m).
 
-    Args:
-        f_number: (...), N, a ratio.
-        magnification: (...), m, a ratio.
-
-    Returns: (...), a ratio.
     Source: S. F. Ray, Applied Photographic Optics (3rd ed. 2002).
 
     At life size it is twice as large:
@@ -184,13 +146,12 @@ def working_f_number(f_number: ArrayLike, magnification: ArrayLike) -> Array:
     return np.asarray(f_number) * (1 + np.asarray(magnification))
 
 
-def airy_radius_um(working_f_number: ArrayLike, wavelength_nm: ArrayLike = GREEN_NM) -> Array:
+def airy_radius_um(working_f_number: ArrayLike, wavelength_nm: NanometresLike = GREEN_NM) -> Array:
     """The first dark ring around a point's image: 1.22 λ N_w.
 
     Args:
         working_f_number: (...), N_w = N (1 + m), a ratio, which the function `working_f_number` gives; far away it is
             the f-number N itself.
-        wavelength_nm: (...), λ in nanometres.
 
     Returns: (...), its radius in micrometres.
     Source: M. Born and E. Wolf, Principles of Optics (7th ed. 1999), section 8.5.2.
@@ -201,13 +162,10 @@ def airy_radius_um(working_f_number: ArrayLike, wavelength_nm: ArrayLike = GREEN
     return 1.22e-3 * np.asarray(wavelength_nm) * np.asarray(working_f_number)
 
 
-def relative_illumination(angle_rad: ArrayLike) -> Array:
+def relative_illumination(angle_rad: AnglesLike) -> Array:
     """The light that reaches the sensor beside the axis, where on the axis it is 1: cos⁴ θ.
 
     The thin lens seen aslant is smaller (cos θ), farther away (cos² θ), and lights the sensor aslant (cos θ).
-
-    Args:
-        angle_rad: (...), θ, from the axis, in radians.
 
     Returns: (...), a share, 0 … 1; none from 90° on, where light would come from beside or behind the lens.
     Source: Szeliski (2022), section 2.2.3.

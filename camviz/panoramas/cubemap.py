@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camviz.cameras import Camera, Intrinsics
+from camviz.lenses.arrays import Count
 from camviz.lenses.base import Array, Lens
 from camviz.poses import RigidTransform, Rotation
 
@@ -126,11 +127,10 @@ class Cubemap(Lens):
         return np.where(last, size - 1, np.floor(place)).clip(-1, size).astype(np.intp)
 
 
-def cubemap_camera(side: int, layout: Layout = Layout.CROSS) -> Camera:
+def cubemap_camera(side: Count, layout: Layout = Layout.CROSS) -> Camera:
     """The camera whose picture is a whole cube map.
 
     Args:
-        side: Of a face, in pixels.
         layout: Where the faces lie.
 
     Returns: Camera at the origin, its front looking along z.
@@ -149,12 +149,11 @@ def cubemap_camera(side: int, layout: Layout = Layout.CROSS) -> Camera:
     return Camera(Intrinsics(layout.columns * side, layout.rows * side, f, f, cx, cy), Cubemap(layout))
 
 
-def face_camera(face: str, side: int) -> Camera:
+def face_camera(face: str, side: Count) -> Camera:
     """The perspective camera of 90° that takes one face of a cube map.
 
     Args:
         face: {"front", "right", "back", "left", "up", "down"}, where it looks.
-        side: In pixels.
 
     Returns: Camera at the origin.
     Raises: ValueError for any other word, naming these.

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from camviz.cameras import Intrinsics, transform
+from camviz.lenses.arrays import Points, Rays
 from camviz.lenses.base import Array, as_points, unit
 from camviz.lenses.fisheye import Fisheye
 from camviz.poses import RigidTransform
@@ -92,24 +93,20 @@ class Mirror:
             root = np.sqrt(p * p - (1 - self.eccentricity**2) * radius**2)
         return np.where(radius <= self.rim, radius**2 / (p + root), np.nan)
 
-    def normal(self, points: ArrayLike) -> Array:
+    def normal(self, points: ArrayLike) -> Rays:
         """The surface's normals, outwards: half the gradient of the quadric.
 
         Args:
             points: (..., 3), of the surface, in metres.
-
-        Returns: (..., 3), unit vectors.
         """
         x, y, z = np.moveaxis(as_points(points, 3, "points"), -1, 0)
         return unit(np.stack([x, y, self.curvature_radius - (1 - self.eccentricity**2) * (self.top - z)], axis=-1))
 
-    def intersect(self, origins: Array, directions: Array) -> Array:
+    def intersect(self, origins: Array, directions: Array) -> Points:
         """Where rays meet the mirror first.
 
         Args:
             origins, directions: (..., 3), in metres; the directions of any length.
-
-        Returns: (..., 3), points in metres; NaN where a ray misses.
         """
         shape = 1 - self.eccentricity**2
         start, step = self.top - origins[..., 2], -directions[..., 2]
@@ -175,8 +172,6 @@ class Catadioptric:
 
         Args:
             metres: By how much.
-
-        Returns: Catadioptric of the same mirror.
         """
         return replace(self, distance=self.distance + metres)
 

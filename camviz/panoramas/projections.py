@@ -11,6 +11,7 @@ import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import Cylindrical, Equidistant, Equirectangular, Equisolid, Lens, Orthographic, Stereographic
+from camviz.lenses.arrays import Count
 from camviz.lenses.fisheye import Fisheye
 from camviz.panoramas.cubemap import FACES, Layout, cubemap_camera, face_camera
 
@@ -37,11 +38,10 @@ class Projection:
     closed: bool
     aspect: float
 
-    def camera(self, width: int, height: int, hfov_deg: float | None = None) -> Camera:
+    def camera(self, width: Count, height: Count, hfov_deg: float | None = None) -> Camera:
         """The camera of a size, looking ahead.
 
         Args:
-            width, height: In pixels.
             hfov_deg: The horizontal field; by default the usual one.
 
         Returns: Camera at the origin.

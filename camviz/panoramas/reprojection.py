@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import Cylindrical, Equirectangular
+from camviz.lenses.arrays import Count, Degrees
 from camviz.lenses.base import Array, blocked_matmul
 from camviz.panoramas.cubemap import Cubemap, cells, joined
 from camviz.poses import RigidTransform, Rotation
@@ -85,15 +86,13 @@ def reproject(
 
 @lru_cache(maxsize=8)
 def window(
-    width: int, height: int, hfov_deg: float, *, yaw_deg: float = 0, pitch_deg: float = 0, roll_deg: float = 0
+    width: Count, height: Count, hfov_deg: Degrees, *, yaw_deg: float = 0, pitch_deg: float = 0, roll_deg: float = 0
 ) -> Camera:
     """A virtual pan-tilt-zoom camera: perspective, turned to the right, then up, then clockwise.
 
     The axes are those of the frustum view: Y X Z, each in the frame turned so far.
 
     Args:
-        width, height: In pixels.
-        hfov_deg: Its horizontal field, between 0 and 180 degrees.
         yaw_deg, pitch_deg, roll_deg: To the right, up and clockwise, in degrees.
 
     Returns: Camera at the origin.

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from camviz.cameras import Intrinsics
 from camviz.lenses import Equirectangular
+from camviz.lenses.arrays import AnglesLike, LinearPicture32, UnitRaysLike
 from camviz.lenses.base import Array, unit
 from camviz.scenes import Scene
-from camviz.scenes.rays import Floats
 
 
 @dataclass(frozen=True)
@@ -76,22 +76,16 @@ class Ring:
         """The longitudes (n,) in radians, -π … π, at which the panorama changes from one camera to the next."""
         return np.sort((self.turn + self.half_angle * (2 * np.arange(self.cameras) + 1) + pi) % (2 * pi) - pi)
 
-    def nearest(self, longitudes: ArrayLike) -> NDArray[np.intp]:
+    def nearest(self, longitudes: AnglesLike) -> NDArray[np.intp]:
         """Which camera looks most nearly at a longitude.
-
-        Args:
-            longitudes: (...), in radians, to the right of z.
 
         Returns: (...), numbers of cameras, from 0.
         """
         turns = self._turns(longitudes)
         return np.rint(turns).astype(np.intp) % self.cameras
 
-    def second(self, longitudes: ArrayLike) -> tuple[NDArray[np.intp], Array]:
+    def second(self, longitudes: AnglesLike) -> tuple[NDArray[np.intp], Array]:
         """The next nearest camera, and its share of the picture.
-
-        Args:
-            longitudes: (...), in radians, to the right of z.
 
         Returns:
             camera: (...), numbers of cameras, from 0.
@@ -129,11 +123,10 @@ class Ring:
         off_seam = side / np.hypot(side / Z, 1 - self.radius * np.cos(self.half_angle) / Z)  # Z sin ψ, for Z = ∞ too
         return 2 * (np.arctan2(side, ahead) - np.arcsin(off_seam / stitched))
 
-    def rays(self, directions: ArrayLike, stitched: float, camera: ArrayLike | None = None) -> tuple[Array, Array]:
+    def rays(self, directions: UnitRaysLike, stitched: float, camera: ArrayLike | None = None) -> tuple[Array, Array]:
         """The rays of cameras that stand in for rays from the middle.
 
         Args:
-            directions: (..., 3), unit vectors from the middle.
             stitched: The rays go to the points that lie so many metres out.
             camera: (...), numbers of cameras; by default the nearest.
 
@@ -146,15 +139,12 @@ class Ring:
         starts = self.centres[nearest if camera is None else np.asarray(camera)]
         return np.broadcast_to(starts, directions.shape), unit(directions - starts / stitched)
 
-    def panorama(self, scene: Scene, pixels: Intrinsics, stitched: float = inf) -> Floats:
+    def panorama(self, scene: Scene, pixels: Intrinsics, stitched: float = inf) -> LinearPicture32:
         """The panorama of a scene; where cameras overlap, their pictures are faded into each other.
 
         Args:
-            scene: What is photographed.
             pixels: Equirectangular pixels; fx is their number per radian.
             stitched: The distance in metres that it is stitched for.
-
-        Returns: (height, width, 3), linear light, float32.
         """
         angles = pixels.from_pixels(pixels.grid()).reshape(-1, 2)
         directions = Equirectangular().unproject(angles)

@@ -1,8 +1,11 @@
 """Light: linear radiance inside, sRGB only at the screen, and the one sun that shades the scenes."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from camviz.lenses.arrays import Shares
 from camviz.lenses.base import Array
 
 SUN = np.array([-0.48, -0.72, -0.50])  # towards the sun: from the left, above and behind a camera at the origin
@@ -29,13 +32,12 @@ def to_linear(encoded: ArrayLike) -> NDArray[np.floating]:
     return np.where(c <= 0.04045, c / 12.92, ((np.maximum(c, 0) + 0.055) / 1.055) ** 2.4)
 
 
-def to_encoded(linear: ArrayLike) -> Array:
+def to_encoded(linear: ArrayLike) -> Shares:
     """sRGB values of linear light: the inverse of `to_linear`.
 
     Args:
         linear: any shape, linear light 0 … 1.
 
-    Returns: any shape, 0 … 1.
     Source: IEC 61966-2-1:1999, section 5.2.
 
     A grey card of 18 % is not far from the middle of the values:

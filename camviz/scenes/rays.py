@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from camviz.lenses.base import ALONE, Array, unit
+from camviz.lenses.arrays import ALONE, Array, unit
 from camviz.poses import RigidTransform
 
 Floats = NDArray[np.float32]

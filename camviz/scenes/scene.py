@@ -9,10 +9,11 @@ from itertools import product
 
 import cv2
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import Lens
+from camviz.lenses.arrays import LinearPicture32, PointsLike, UnitRaysLike
 from camviz.lenses.base import Array, as_points
 from camviz.scenes.batched import Indices, Traced, batched
 from camviz.scenes.intersection import Hit
@@ -49,14 +50,12 @@ class Scene:
     surfaces: Sequence[Surface]
     sky: Texture = field(default_factory=lambda: Texture.plain((0.62, 0.72, 0.82)))
 
-    def trace(self, origins: ArrayLike, directions: ArrayLike, spread: float = 0.0) -> tuple[Floats, Floats]:
+    def trace(self, origins: PointsLike, directions: UnitRaysLike, spread: float = 0.0) -> tuple[Floats, Floats]:
         """Follow rays to the nearest surface.
 
         A ray that meets nothing shows the sky. A direction that is NaN is no ray, and shows a neutral grey.
 
         Args:
-            origins: (..., 3), in metres.
-            directions: (..., 3), unit vectors.
             spread: The angle in radians between neighbouring rays, over which textures are averaged; 0 averages
                 nothing.
 
@@ -164,15 +163,12 @@ class Scene:
         return tuple(surface.mesh() for surface in self.surfaces)
 
 
-def render(scene: Scene, camera: Camera, supersample: int = 1) -> Floats:
+def render(scene: Scene, camera: Camera, supersample: int = 1) -> LinearPicture32:
     """The picture that a camera takes of a scene, as light.
 
     Args:
-        scene: What is photographed.
-        camera: With any lens.
         supersample: n: each pixel is the mean of n × n rays.
 
-    Returns: (height, width, 3), linear light, float32.
     Raises: ValueError unless n is a whole number of at least 1.
 
     A white wall that fills the middle two of four columns:
@@ -197,10 +193,6 @@ def render(scene: Scene, camera: Camera, supersample: int = 1) -> Floats:
 
 def snapshot(scene: Scene, camera: Camera) -> NDArray[np.uint8]:
     """The picture that a camera takes of a scene, for the screen: to_display(render(scene, camera)).
-
-    Args:
-        scene: What is photographed.
-        camera: With any lens.
 
     Returns: (height, width, 3), sRGB bytes, uint8.
 

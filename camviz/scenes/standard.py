@@ -49,7 +49,7 @@ def board_corners() -> Array:
 def textured_scene() -> Scene:
     """The garden: a calibration board, a crate with a globe, a ball, a brick wall, and lamps into the distance.
 
-    Returns: Always the same one; y points down, in metres.
+    Always the same one; y points down, in metres.
 
     Straight ahead of the origin hangs a picture, on a wall 6.5 m away:
 

@@ -54,7 +54,6 @@ class Texture:
         Args:
             rgb: (3,), sRGB 0 … 1.
 
-        Returns: Texture of a single texel.
         Raises: ValueError for another shape.
         """
         return cls(to_linear(as_points(rgb, 3, "rgb")).reshape(1, 1, 3))

@@ -26,7 +26,7 @@ LAMP = (1.02, -0.40, 1.85)
 def wall_scene() -> Scene:
     """The garden's wall, 2.4 m away and square to a camera at the origin, with a lamp, a picture and a ball before it.
 
-    Returns: Always the same one; y points down, in metres.
+    Always the same one; y points down, in metres.
 
     A camera that sees 90° across sees the wall from border to border, and the coping above it:
 

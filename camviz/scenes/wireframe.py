@@ -63,7 +63,6 @@ class Wireframe:
         Args:
             max_length: Points are no more than so many metres apart.
 
-        Returns: Wireframe with the same names.
         Raises: ValueError unless `max_length` is positive.
         """
         if not max_length > 0:

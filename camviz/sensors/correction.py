@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from camviz.lenses.arrays import Charges, Count, Electrons, ElectronsLike, FrameLike, Variances
 from camviz.sensors.sensor import Sensor
 
 Array = NDArray[np.float64]
@@ -60,11 +61,8 @@ class NoiseModel:
         """The model of a sensor whose parameters are known.
 
         Args:
-            sensor: Its parameters.
             exposure_s: In seconds: dark current adds noise and brightens the black.
             temperature_c: In °C; by default the sensor's reference temperature.
-
-        Returns: NoiseModel of one pixel.
         """
         noise = np.hypot(sensor.dark_noise_e(exposure_s, temperature_c), np.sqrt(1 / 12) / sensor.gain_dn_per_e)
         current = sensor.dark_current(sensor.reference_temperature_c if temperature_c is None else temperature_c)
@@ -84,62 +82,33 @@ class NoiseModel:
         """
         return (np.asarray(dn, dtype=float) - self.black_dn) / self.gain_dn_per_e
 
-    def temporal_variance(self, electrons: ArrayLike) -> Array:
-        """The noise that changes from frame to frame: σ² = σ_d² + μ_e.
-
-        Args:
-            electrons: (...), the mean signal μ_e in electrons.
-
-        Returns: (...), in electrons².
-        """
+    def temporal_variance(self, electrons: ElectronsLike) -> Variances:
+        """The noise that changes from frame to frame: σ² = σ_d² + μ_e."""
         return self.dark_noise_e**2 + np.maximum(np.asarray(electrons, dtype=float), 0)
 
-    def pattern_variance(self, electrons: ArrayLike) -> Array:
-        """What is the same in every frame: DSNU² + (PRNU μ_e)².
-
-        Args:
-            electrons: (...), the mean signal μ_e in electrons.
-
-        Returns: (...), in electrons².
-        """
+    def pattern_variance(self, electrons: ElectronsLike) -> Variances:
+        """What is the same in every frame: DSNU² + (PRNU μ_e)²."""
         return self.dsnu_e**2 + (self.prnu * np.asarray(electrons, dtype=float)) ** 2
 
     # What each remedy leaves ------------------------------------------------------------------------------------------
 
-    def noise_averaged(self, electrons: ArrayLike, frames: int = 1) -> Array:
-        """Noise in the mean of several frames: temporal noise falls with their root, the pattern stays.
-
-        Args:
-            electrons: (...), the mean signal in electrons.
-            frames: How many.
-
-        Returns: (...), a standard deviation in electrons.
-        """
+    def noise_averaged(self, electrons: ElectronsLike, frames: Count = 1) -> Electrons:
+        """Noise in the mean of several frames: temporal noise falls with their root, the pattern stays."""
         return np.sqrt(self.temporal_variance(electrons) / frames + self.pattern_variance(electrons))
 
-    def noise_less_dark(self, electrons: ArrayLike, darks: int) -> Array:
-        """Noise in one frame less the mean of several dark ones: their noise for the DSNU.
-
-        Args:
-            electrons: (...), the mean signal in electrons.
-            darks: How many.
-
-        Returns: (...), a standard deviation in electrons.
-        """
+    def noise_less_dark(self, electrons: ElectronsLike, darks: Count) -> Electrons:
+        """Noise in one frame less the mean of several dark ones: their noise for the DSNU."""
         shade = (self.prnu * np.asarray(electrons, dtype=float)) ** 2
         return np.sqrt(self.temporal_variance(electrons) + self.dark_noise_e**2 / darks + shade)
 
-    def noise_flattened(self, electrons: ArrayLike, darks: int, flats: int, flat_electrons: float) -> Array:
+    def noise_flattened(self, electrons: ElectronsLike, darks: int, flats: int, flat_electrons: float) -> Electrons:
         """Noise in one frame divided by a flat field: both patterns gone, both stacks' noise added.
 
         y = (f - d) / (F - d) · mean: the dark stack enters above and below, with weight 1 - e/F in all.
 
         Args:
-            electrons: (...), the mean signal e in electrons.
             darks, flats: How many dark and how many flat frames were averaged.
             flat_electrons: The mean signal of the flat field, F.
-
-        Returns: (...), a standard deviation in electrons.
         """
         share = np.asarray(electrons, dtype=float) / flat_electrons
         dark = (1 - share) ** 2 * self.dark_noise_e**2 / darks
@@ -164,11 +133,10 @@ def average(frames: Sequence[ArrayLike]) -> Array:
     return _stacked(frames).mean(axis=0)
 
 
-def less_dark(frame: ArrayLike, dark: ArrayLike) -> Array:
+def less_dark(frame: FrameLike, dark: ArrayLike) -> Array:
     """A frame less a dark frame: offsets, DSNU and dark current are gone.
 
     Args:
-        frame: (height, width), in DN.
         dark: (height, width), in DN, of the same exposure and temperature. Best is the average of many: one alone adds
             its own noise, up to √2 times as much where there is no light.
 
@@ -275,19 +243,17 @@ def unstabilised(values: ArrayLike, dark_noise_e: float) -> Array:
     return d**2 / 4 + half / (4 * d) - 11 / (8 * d**2) + 5 * half / (8 * d**3) - 1 / 8 - dark_noise_e**2
 
 
-def smoothed(frame: ArrayLike, model: NoiseModel, method: str = "non-local", strength: float = 1.0) -> Array:
+def smoothed(frame: FrameLike, model: NoiseModel, method: str = "non-local", strength: float = 1.0) -> Charges:
     """A frame in electrons with its noise smoothed, as strongly as the noise model says.
 
     The frame is stabilised first, so that one strength suits all of it.
 
     Args:
-        frame: (height, width), in DN.
         model: Of the sensor.
         method: {"non-local", "gaussian"}. "gaussian" blurs by `strength` pixels, noise and detail alike; "non-local"
             averages patches that differ by no more than `strength` times what noise would make of equal ones.
         strength: In pixels, or times the noise.
 
-    Returns: (height, width), in electrons.
     Raises: ValueError for another method, and a strength that is not above 0.
     Source: A. Buades, B. Coll and J.-M. Morel, A non-local algorithm for image denoising, CVPR 2005.
 

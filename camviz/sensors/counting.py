@@ -20,7 +20,6 @@ def poisson(mean: ArrayLike, rng: np.random.Generator) -> Floats:
 
     Args:
         mean: any shape, how many are expected, such as electrons; below zero counts as none.
-        rng: Draws them.
 
     Returns: any shape, counts, float32.
     Source: E. A. Cornish and R. A. Fisher, Moments and cumulants in the specification of distributions, Rev. Inst. Int.

@@ -7,15 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from camviz.lenses.arrays import CelsiusLike
+
 BOLTZMANN_EV_PER_K = 8.617333262e-5
 ZERO_CELSIUS_K = 273.15
 
 
-def band_gap_ev(temperature_c: ArrayLike) -> Any:
+def band_gap_ev(temperature_c: CelsiusLike) -> Any:
     """Silicon's band gap: E_g = 1.1557 - 7.021e-4 T² / (1108 + T), T in kelvin.
-
-    Args:
-        temperature_c: (...), in °C.
 
     Returns: array (...), in electron volts.
 
@@ -31,13 +30,10 @@ def band_gap_ev(temperature_c: ArrayLike) -> Any:
     return 1.1557 - 7.021e-4 * T**2 / (1108 + T)
 
 
-def dark_current_ratio(temperature_c: ArrayLike, reference_c: ArrayLike) -> Any:
+def dark_current_ratio(temperature_c: CelsiusLike, reference_c: CelsiusLike) -> Any:
     """How many times the dark current at one temperature flows at another.
 
     Electrons climb by way of traps in the middle of the gap: D ∝ T^1.5 exp(-E_g / 2kT).
-
-    Args:
-        temperature_c, reference_c: (...), in °C.
 
     Returns: array (...), a ratio, 1 at the reference.
 
@@ -56,13 +52,10 @@ def dark_current_ratio(temperature_c: ArrayLike, reference_c: ArrayLike) -> Any:
     return (T / reference) ** 1.5 * np.exp(halves / (2 * BOLTZMANN_EV_PER_K))
 
 
-def doubling_temperature_k(temperature_c: ArrayLike) -> Any:
+def doubling_temperature_k(temperature_c: CelsiusLike) -> Any:
     """By how much silicon must warm for its dark current to double, at the slope that it has at a temperature.
 
     ln 2 / (d ln D / dT) = ln 2 · T / (3/2 + (E_g - T E_g') / 2kT): it grows with the temperature.
-
-    Args:
-        temperature_c: (...), in °C.
 
     Returns: array (...), in kelvin.
 

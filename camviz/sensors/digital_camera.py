@@ -8,10 +8,11 @@ from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from camviz.cameras import Camera
 from camviz.colour.spectra import WAVELENGTHS_NM, illuminant, observer, sensitivities
+from camviz.lenses.arrays import FrameLike, LinearPictureLike, Seconds, Share
 from camviz.lenses.base import Array
 from camviz.mosaics import BAYER, Pattern, demosaic, mosaic
 from camviz.scenes.light import to_display
@@ -130,28 +131,17 @@ class DigitalCamera:
         if not 0 < self.transmittance <= 1:
             raise ValueError(f"transmittance must be a share above 0 and at most 1, got {self.transmittance}")
 
-    def shoot(self, scene: Scene, exposure_s: float, rng: np.random.Generator, supersample: int = 1) -> Shot:
+    def shoot(self, scene: Scene, exposure_s: Seconds, rng: np.random.Generator, supersample: int = 1) -> Shot:
         """Photograph a scene.
 
         Args:
-            scene: What is photographed.
-            exposure_s: In seconds.
-            rng: Draws the noise.
             supersample: Each pixel's light is the mean of supersample² rays.
-
-        Returns: Every step of it.
         """
         return self.take(render(scene, self.camera, supersample), exposure_s, rng)
 
-    def take(self, light: ArrayLike, exposure_s: float, rng: np.random.Generator) -> Shot:
+    def take(self, light: LinearPictureLike, exposure_s: Seconds, rng: np.random.Generator) -> Shot:
         """Photograph a picture of light, as `render` traces it.
 
-        Args:
-            light: (height, width, 3), linear, 1 for a white wall.
-            exposure_s: In seconds.
-            rng: Draws the noise.
-
-        Returns: Every step of it.
         Raises: ValueError for light that has not the camera's size.
         """
         linear = np.asarray(light, dtype=np.float32)
@@ -194,23 +184,14 @@ class DigitalCamera:
         photons, electrons = (np.asarray(one, dtype=np.float32).take(kind) for one in self.channels)
         return gathered * photons, gathered * electrons
 
-    def white_exposure_s(self, share: float = 0.8) -> float:
-        """The exposure at which a white wall on the axis fills the fullest channel to a share of saturation.
-
-        Args:
-            share: 0 … 1.
-
-        Returns: In seconds.
-        """
+    def white_exposure_s(self, share: Share = 0.8) -> Seconds:
+        """The exposure at which a white wall on the axis fills the fullest channel to a share of saturation."""
         lux = self.scene_lux * self.transmittance / (4 * self.f_number**2)
         fullest = self.channels.electrons[list(self.pattern.present)].max()
         return float(share * self.sensor.saturation_e / (lux * self.pitch_um**2 * fullest))
 
-    def developed(self, raw: ArrayLike) -> Array:
+    def developed(self, raw: FrameLike) -> Array:
         """Linear light of raw numbers: offset off, white balanced, demosaiced.
-
-        Args:
-            raw: (height, width), in DN.
 
         Returns: (height, width, 3), linear; 1 where the fullest channel saturates.
         """

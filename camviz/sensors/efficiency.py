@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+
+from camviz.lenses.arrays import NanometresLike
 
 
 @dataclass(frozen=True)
@@ -39,11 +40,8 @@ class EfficiencyCurve:
         if not all(0 <= value <= 1 for value in self.value):
             raise ValueError(f"value must hold efficiencies between 0 and 1, got {self.value}")
 
-    def at(self, wavelength_nm: ArrayLike) -> Any:
+    def at(self, wavelength_nm: NanometresLike) -> Any:
         """The efficiency at wavelengths.
-
-        Args:
-            wavelength_nm: (...), in nanometres.
 
         Returns: array (...), electrons per photon, 0 … 1.
         """

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from camviz.cameras import Camera
+from camviz.lenses.arrays import Charges, ChargesLike, Count, LinearPicture32, Seconds
 from camviz.lenses.base import Array, as_points
 from camviz.poses import RigidTransform
 from camviz.scenes.scene import Scene
@@ -42,16 +43,11 @@ class CcdRegister:
     read: Array
 
 
-def bucket_brigade(electrons: ArrayLike, ticks: int) -> CcdRegister:
+def bucket_brigade(electrons: ChargesLike, ticks: Count) -> CcdRegister:
     """The brigade of a CCD after the amplifier has read some pixels: rows shift into the register, which shifts along.
 
     A row enters the register when the one before has been read out, all with perfect transfer.
 
-    Args:
-        electrons: (height, width), charges in electrons; row 0 is the first to be read.
-        ticks: How many pixels have been read.
-
-    Returns: Where all the charge is.
     Raises: ValueError for fewer than 0 or more than height · width ticks.
     Source: J. R. Janesick, Scientific Charge-Coupled Devices (2001), chapter 1.
 
@@ -72,14 +68,13 @@ def bucket_brigade(electrons: ArrayLike, ticks: int) -> CcdRegister:
     return CcdRegister(area, register, charge.ravel()[:ticks])
 
 
-def transferred(electrons: ArrayLike, efficiency: float, overscan: int = 0) -> Array:
+def transferred(electrons: ChargesLike, efficiency: float, overscan: int = 0) -> Array:
     """Charges as they reach the register, when each shift leaves some behind.
 
     Row i needs n = i + 1 shifts; what is left behind k times comes k rows later, a share C(n+k-1, k) c^n (1-c)^k: the
     negative binomial law.
 
     Args:
-        electrons: (height, width), charges in electrons; row 0 is the first to be read.
         efficiency: The share of a charge that a shift moves, c, above 0.5 and at most 1.
         overscan: Further shifts, of empty rows, that show the trail of the last row.
 
@@ -108,18 +103,15 @@ def transferred(electrons: ArrayLike, efficiency: float, overscan: int = 0) -> A
     return arrived
 
 
-def smeared(electrons: ArrayLike, exposure_s: float, row_shift_s: float) -> Array:
+def smeared(electrons: ChargesLike, exposure_s: Seconds, row_shift_s: float) -> Charges:
     """Charges when light still falls while the rows of a CCD shift: each row passes under every row's light.
 
     q + t_shift/t_exposure · (sum of its column): half of it gathered on the way in, half on the way out. That is a CCD
     without a shutter or a shielded storage; the stripe runs through the whole column of anything bright.
 
     Args:
-        electrons: (height, width), charges in electrons.
-        exposure_s: In seconds.
         row_shift_s: How long a row stays under the next one's light, in seconds.
 
-    Returns: (height, width), in electrons.
     Raises: ValueError for times below zero, and an exposure of no time.
     Source: J. R. Janesick, Scientific Charge-Coupled Devices (2001), chapter 5.
 
@@ -138,16 +130,14 @@ def smeared(electrons: ArrayLike, exposure_s: float, row_shift_s: float) -> Arra
     return np.asarray(charge + stripe, dtype=np.float64)
 
 
-def bloomed(electrons: ArrayLike, full_well_e: float) -> Array:
+def bloomed(electrons: ChargesLike, full_well_e: float) -> Charges:
     """Charges when full wells spill along their columns, half of the surplus either way, until there is room.
 
     Channel stops keep columns apart; what reaches the column's end is lost. An anti-blooming drain instead is `fill`.
 
     Args:
-        electrons: (height, width), charges in electrons.
         full_well_e: What a well holds.
 
-    Returns: (height, width), in electrons.
     Raises: ValueError for a full well that is not above 0.
     Source: J. R. Janesick, Scientific Charge-Coupled Devices (2001), chapter 4.
 
@@ -172,13 +162,11 @@ def bloomed(electrons: ArrayLike, full_well_e: float) -> Array:
 # CMOS: every row at its own time -------------------------------------------------------------------------------------
 
 
-def row_times(height: int, row_s: float, exposure_s: float = 0.0) -> Array:
+def row_times(height: Count, row_s: float, exposure_s: Seconds = 0.0) -> Array:
     """When each row of a rolling shutter is in the middle of its exposure; row 0 begins at 0.
 
     Args:
-        height: How many rows.
         row_s: From one row to the next, in seconds; 0 is a global shutter.
-        exposure_s: In seconds.
 
     Returns: (height,), in seconds.
 
@@ -221,20 +209,16 @@ def rolling_rays(camera: Camera, poses: RigidTransform) -> tuple[Array, Array]:
 
 
 def rolling_picture(
-    scene: Scene, camera: Camera, motion: Callable[[Array], RigidTransform], row_s: float, exposure_s: float = 0.0
-) -> NDArray[np.float32]:
+    scene: Scene, camera: Camera, motion: Callable[[Array], RigidTransform], row_s: Seconds, exposure_s: Seconds = 0.0
+) -> LinearPicture32:
     """The picture of a moving camera whose rows are exposed one after the other.
 
     Each row is traced at the middle of its exposure, so the picture is distorted and not blurred.
 
     Args:
-        scene: What is photographed.
         camera: Its own pose does not count.
         motion: Gives the poses world_from_cam at times (n,) in seconds.
-        row_s: From one row to the next, in seconds.
-        exposure_s: In seconds.
 
-    Returns: (height, width, 3), linear light, float32.
     Raises: ValueError unless the motion gives one pose for each row.
     Source: E. Ringaby and P.-E. Forssén, Efficient video rectification and stabilisation for cell-phones, Int. J.
     Comput. Vis. 96 (2012).

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from camviz.lenses.arrays import Celsius, Count, Seconds
 from camviz.sensors.counting import Floats
 from camviz.sensors.dark import dark_current_ratio
 from camviz.sensors.efficiency import EfficiencyCurve
@@ -138,21 +139,15 @@ class Sensor:
         one = self.quantum_efficiency * self.fill_factor
         return one if wavelength_nm is None else np.full(np.shape(wavelength_nm), one)[()]
 
-    def dark_current(self, temperature_c: float) -> float:
+    def dark_current(self, temperature_c: Celsius) -> float:
         """Dark current at a temperature, from that at the reference temperature.
-
-        Args:
-            temperature_c: In °C.
 
         Returns: In electrons per second and pixel.
         """
         return self.dark_current_e_per_s * float(dark_current_ratio(temperature_c, self.reference_temperature_c))
 
-    def pattern(self, height: int, width: int) -> FixedPattern:
+    def pattern(self, height: Count, width: Count) -> FixedPattern:
         """This specimen's fixed pattern: the same at every call, so that it can be measured and taken out.
-
-        Args:
-            height, width: In pixels.
 
         Returns: Its arrays are read-only.
         """
@@ -160,16 +155,13 @@ class Sensor:
         offset = Spread(self.dsnu_e, self.dsnu_column_share, self.dsnu_row_share)
         return fixed_pattern(gain, offset, self.specimen, height, width)
 
-    def expose(self, photons: ArrayLike, exposure_s: float, temperature_c: float, rng: np.random.Generator) -> Exposure:
+    def expose(
+        self, photons: ArrayLike, exposure_s: Seconds, temperature_c: Celsius, rng: np.random.Generator
+    ) -> Exposure:
         """One frame of monochromatic light at `measured_at_nm`. For light of many colours, see `collect`.
 
         Args:
             photons: (height, width), the number expected on each pixel during the whole exposure.
-            exposure_s: In seconds.
-            temperature_c: In °C.
-            rng: Draws the noise.
-
-        Returns: Every step of it.
 
         Raises:
             ValueError: For photons that are not (height, width), not finite or below zero, and an exposure below zero.
@@ -180,8 +172,8 @@ class Sensor:
     def collect(
         self,
         electrons: ArrayLike,
-        exposure_s: float,
-        temperature_c: float,
+        exposure_s: Seconds,
+        temperature_c: Celsius,
         rng: np.random.Generator,
         photons: ArrayLike | None = None,
     ) -> Exposure:
@@ -189,12 +181,7 @@ class Sensor:
 
         Args:
             electrons: (height, width), the number expected during the whole exposure.
-            exposure_s: In seconds.
-            temperature_c: In °C.
-            rng: Draws the noise.
             photons: (height, width), photons expected, which are only reported.
-
-        Returns: Every step of it.
 
         Raises:
             ValueError: For electrons that are not (height, width), not finite or below zero, and an exposure below
@@ -225,11 +212,10 @@ class Sensor:
         """The most electrons that a digital number can tell apart: the full well, or what the converter reaches."""
         return min(self.full_well_e, (2**self.bits - 1 - self.offset_dn) / self.gain_dn_per_e)
 
-    def dark_noise_e(self, exposure_s: float = 0.0, temperature_c: float | None = None) -> float:
+    def dark_noise_e(self, exposure_s: Seconds = 0.0, temperature_c: float | None = None) -> float:
         """Read noise and the dark current's own, without quantisation: sqrt(σ_read² + D t).
 
         Args:
-            exposure_s: In seconds.
             temperature_c: In °C; by default the reference temperature.
 
         Returns: A standard deviation in electrons.
@@ -237,14 +223,13 @@ class Sensor:
         current = self.dark_current(self.reference_temperature_c if temperature_c is None else temperature_c)
         return float(np.sqrt(self.read_noise_e**2 + current * exposure_s))
 
-    def snr(self, photons: ArrayLike, exposure_s: float = 0.0, temperature_c: float | None = None) -> Any:
+    def snr(self, photons: ArrayLike, exposure_s: Seconds = 0.0, temperature_c: float | None = None) -> Any:
         """The signal-to-noise ratio of one pixel over time, below saturation.
 
         η μ_p / sqrt(σ_d² + σ_q²/K² + η μ_p) with σ_q² = 1/12.
 
         Args:
             photons: (...), on the pixel, μ_p.
-            exposure_s: In seconds.
             temperature_c: In °C; by default the reference temperature.
 
         Returns: array (...), a ratio.
@@ -252,13 +237,12 @@ class Sensor:
         signal = np.multiply(photons, self.efficiency())
         return signal / np.sqrt(self._floor_e(exposure_s, temperature_c) ** 2 + signal)
 
-    def threshold_photons(self, exposure_s: float = 0.0, temperature_c: float | None = None) -> float:
+    def threshold_photons(self, exposure_s: Seconds = 0.0, temperature_c: float | None = None) -> float:
         """The absolute sensitivity threshold: how many photons give SNR = 1.
 
         From η μ = sqrt(σ² + η μ): η μ = ½ + sqrt(σ² + ¼). EMVA 1288 prints its approximation σ + ½ (section 6.6).
 
         Args:
-            exposure_s: In seconds.
             temperature_c: In °C; by default the reference temperature.
 
         Returns: Photons on the pixel.
@@ -266,11 +250,10 @@ class Sensor:
         floor = self._floor_e(exposure_s, temperature_c)
         return (0.5 + (floor**2 + 0.25) ** 0.5) / float(self.efficiency())
 
-    def dynamic_range(self, exposure_s: float = 0.0, temperature_c: float | None = None) -> float:
+    def dynamic_range(self, exposure_s: Seconds = 0.0, temperature_c: float | None = None) -> float:
         """Saturation over absolute sensitivity threshold.
 
         Args:
-            exposure_s: In seconds.
             temperature_c: In °C; by default the reference temperature.
 
         Returns: A plain ratio; 20 log10 of it is in dB, log2 in stops.

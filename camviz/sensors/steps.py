@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from camviz.lenses.arrays import Electrons32, ElectronsLike, Seconds
 from camviz.sensors.counting import Floats, poisson, poisson_alike
 
 Words = NDArray[np.uint16]
 
 
-def convert(photons: ArrayLike, efficiency: ArrayLike, rng: np.random.Generator) -> Floats:
+def convert(photons: ArrayLike, efficiency: ArrayLike, rng: np.random.Generator) -> Electrons32:
     """Electrons that light sets free, each photon with a chance of `efficiency`.
 
     A random number of photons, thinned at random, is again Poisson: e ~ Poisson(η μ_p).
@@ -18,9 +19,7 @@ def convert(photons: ArrayLike, efficiency: ArrayLike, rng: np.random.Generator)
     Args:
         photons: any shape, how many photons arrive on average.
         efficiency: any shape, η, electrons per photon.
-        rng: Draws the electrons.
 
-    Returns: any shape, electrons, float32.
     Source: EMVA Standard 1288, release 4.0 linear (2021).
 
     >>> convert(np.full(100_000, 1000), 0.6, np.random.default_rng(0)).mean().round()
@@ -29,16 +28,15 @@ def convert(photons: ArrayLike, efficiency: ArrayLike, rng: np.random.Generator)
     return poisson(np.multiply(photons, efficiency, dtype=np.float32), rng)
 
 
-def leak(shape: tuple[int, ...], dark_current_e_per_s: float, exposure_s: float, rng: np.random.Generator) -> Floats:
+def leak(
+    shape: tuple[int, ...], dark_current_e_per_s: float, exposure_s: Seconds, rng: np.random.Generator
+) -> Electrons32:
     """Electrons that heat sets free during the exposure: Poisson(dark current · t).
 
     Args:
         shape: Of what is returned.
         dark_current_e_per_s: In electrons per second and pixel.
-        exposure_s: In seconds.
-        rng: Draws the electrons.
 
-    Returns: any shape, electrons, float32.
     Source: EMVA Standard 1288, release 4.0 linear (2021).
 
     >>> leak((500, 500), dark_current_e_per_s=2, exposure_s=10, rng=np.random.default_rng(0)).mean().round()
@@ -47,14 +45,12 @@ def leak(shape: tuple[int, ...], dark_current_e_per_s: float, exposure_s: float,
     return poisson_alike(dark_current_e_per_s * exposure_s, shape, rng)
 
 
-def fill(electrons: ArrayLike, full_well_e: float) -> Floats:
+def fill(electrons: ArrayLike, full_well_e: float) -> Electrons32:
     """What the wells hold of charges.
 
     Args:
         electrons: any shape, charges in electrons.
         full_well_e: The most that a well holds.
-
-    Returns: any shape, electrons, float32.
 
     >>> fill([9_000, 12_000], full_well_e=10_000)
     array([ 9000., 10000.], dtype=float32)
@@ -62,15 +58,13 @@ def fill(electrons: ArrayLike, full_well_e: float) -> Floats:
     return np.minimum(electrons, full_well_e, dtype=np.float32)
 
 
-def read(charge_e: ArrayLike, offset_e: ArrayLike, read_noise_e: float, rng: np.random.Generator) -> Floats:
+def read(
+    charge_e: ElectronsLike, offset_e: ElectronsLike, read_noise_e: float, rng: np.random.Generator
+) -> Electrons32:
     """The signal as the amplifier reports it: with each pixel's own offset, and fresh noise each time.
 
     Args:
-        charge_e, offset_e: any shape, in electrons.
         read_noise_e: A standard deviation in electrons.
-        rng: Draws the noise.
-
-    Returns: any shape, in electrons, float32.
 
     >>> read(np.zeros(100_000), offset_e=0, read_noise_e=5, rng=np.random.default_rng(0)).std().round(1)
     np.float32(5.0)
@@ -83,11 +77,10 @@ def read(charge_e: ArrayLike, offset_e: ArrayLike, read_noise_e: float, rng: np.
     return signal
 
 
-def amplify(signal_e: ArrayLike, gain_dn_per_e: float, offset_dn: float) -> Floats:
+def amplify(signal_e: ElectronsLike, gain_dn_per_e: float, offset_dn: float) -> Floats:
     """The voltage before the converter, counted in its steps: K e + offset.
 
     Args:
-        signal_e: any shape, in electrons.
         gain_dn_per_e: K.
         offset_dn: The black level.
 

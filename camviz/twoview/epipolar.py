@@ -6,20 +6,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from camviz.cameras import Camera, Intrinsics
+from camviz.lenses.arrays import Homogeneous, LinesLike, MatrixLike, PixelsLike, RaysLike
 from camviz.lenses.base import Array, as_points, unit
 from camviz.poses import RigidTransform
 
 ROUNDED = 1e-10  # of the terms of a sum: what is left of them is the rounding of F and of the epipole, by SVD too
 
 
-def to_homogeneous(uv: ArrayLike) -> Array:
-    """Pixels as homogeneous points.
-
-    Args:
-        uv: (..., 2), in pixels.
-
-    Returns: (..., 3), homogeneous, their last coordinate 1.
-    Raises: ValueError for another shape.
+def to_homogeneous(uv: PixelsLike) -> Homogeneous:
+    """Pixels as homogeneous points, their last coordinate 1.
 
     >>> to_homogeneous([3, 4])
     array([3., 4., 1.])
@@ -63,14 +58,10 @@ def singular_values(values: ArrayLike, name: str) -> tuple[Array, Array, Array]:
     return U, s, Vt
 
 
-def cross_matrix(v: ArrayLike) -> Array:
+def cross_matrix(v: RaysLike) -> Array:
     """The matrix [v]× of a vector, so that [v]× w = v × w.
 
-    Args:
-        v: (..., 3), in any unit.
-
     Returns: (..., 3, 3), antisymmetric.
-    Raises: ValueError for another shape.
     Source: Hartley & Zisserman (2004), eq. A4.5.
 
     >>> cross_matrix((1, 2, 3))
@@ -84,15 +75,11 @@ def cross_matrix(v: ArrayLike) -> Array:
 def projection_matrix(camera: Camera) -> Array:
     """The matrix P = K [R | t] of a perspective camera.
 
-    Args:
-        camera: With a lens that keeps straight lines straight.
-
     Returns: (3, 4), from homogeneous world points in metres to homogeneous pixels.
     Raises: ValueError for a lens that bends.
     Source: Hartley & Zisserman (2004), eq. 6.8.
 
-    >>> from camviz.cameras import Camera, Intrinsics
-    >>> from camviz import look_at
+    >>> from camviz.cameras import Camera, Intrinsics, look_at
     >>> camera = Camera(Intrinsics(640, 480, 500, 500, 320, 240), world_from_cam=look_at((0, 0, -2), (0, 0, 0)))
     >>> projection_matrix(camera)
     array([[500.,   0., 320., 640.],
@@ -113,13 +100,9 @@ def right_from_left(left: Camera, right: Camera) -> RigidTransform:
 
     Returns: t in metres: where the left camera stands as the right one sees it.
 
-    A camera that stands 10 cm to the right sees the left one 10 cm to the left:
-
-    >>> from camviz.cameras import Camera, Intrinsics
-    >>> from camviz.poses import RigidTransform
+    >>> from camviz.cameras import Camera, Intrinsics, look_at
     >>> left = Camera(Intrinsics.from_fov(640, 480, 60))
-    >>> right = left.at(RigidTransform.from_translation([0.1, 0, 0]))
-    >>> right_from_left(left, right).translation
+    >>> right_from_left(left, left.at(look_at((0.1, 0, 0), (0.1, 0, 1)))).translation  # from 0.1 m to the right of it
     array([-0.1,  0. ,  0. ])
     """
     return right.cam_from_world * left.world_from_cam
@@ -174,34 +157,27 @@ def fundamental(left: Camera, right: Camera) -> Array:
     return np.linalg.inv(right.intrinsics.K).T @ E @ np.linalg.inv(left.intrinsics.K)
 
 
-def essential_from_fundamental(F: ArrayLike, left: Intrinsics, right: Intrinsics) -> Array:
+def essential_from_fundamental(F: MatrixLike, left: Intrinsics, right: Intrinsics) -> Array:
     """The essential matrix of a fundamental one: E = K_rightᵀ F K_left.
 
     Args:
-        F: (3, 3), the fundamental matrix, on any scale.
         left, right: Of the two cameras.
 
     Returns: (3, 3), on the scale of F.
-    Raises: ValueError for another shape.
     Source: Hartley & Zisserman (2004), eq. 9.12.
 
-    >>> from camviz.cameras import Camera, Intrinsics
-    >>> from camviz.poses import RigidTransform
-    >>> left = Camera(Intrinsics(640, 480, 500, 500, 320, 240))
-    >>> right = left.at(RigidTransform.from_translation([1, 0, 0]))
-    >>> essential_from_fundamental(fundamental(left, right), left.intrinsics, right.intrinsics).round(9) + 0
-    array([[ 0.,  0.,  0.],
-           [ 0.,  0.,  1.],
-           [ 0., -1.,  0.]])
+    >>> from camviz.cameras import Intrinsics
+    >>> grid = Intrinsics(640, 480, 500, 500, 320, 240)
+    >>> essential_from_fundamental([[0, 0, 0], [0, 0, 1], [0, -1, 0]], grid, grid)  # of a rectified pair
+    array([[   0.,    0.,    0.],
+           [   0.,    0.,  500.],
+           [   0., -500.,    0.]])
     """
     return right.K.T @ as_matrix(F, "F") @ left.K
 
 
-def epipoles(F: ArrayLike) -> tuple[Array, Array]:
+def epipoles(F: MatrixLike) -> tuple[Array, Array]:
     """The left and the right epipole, each the image of the other camera's centre: F e_left = 0 and Fᵀ e_right = 0.
-
-    Args:
-        F: (3, 3), the fundamental matrix, on any scale.
 
     Returns:
         left: (3,), a homogeneous unit vector; `from_homogeneous` gives the pixel. Its last coordinate is 0 where the
@@ -211,13 +187,9 @@ def epipoles(F: ArrayLike) -> tuple[Array, Array]:
     Raises: ValueError for an F of rank below 2, or of another shape.
     Source: Hartley & Zisserman (2004), section 9.2.
 
-    A camera that moves straight ahead sees where it goes in the middle of its picture:
+    A camera that moves straight ahead, F = [e]×, sees where it goes in the middle of its picture:
 
-    >>> from camviz.cameras import Camera, Intrinsics
-    >>> from camviz.poses import RigidTransform
-    >>> behind = Camera(Intrinsics(640, 480, 500, 500, 320, 240))
-    >>> ahead = behind.at(RigidTransform.from_translation([0, 0, 1]))
-    >>> from_homogeneous(epipoles(fundamental(behind, ahead))[0]).round(6)
+    >>> from_homogeneous(epipoles(cross_matrix((320, 240, 1)))[0]).round(6)
     array([320., 240.])
     """
     # Counting in thousands of pixels makes the entries of F alike in size, which spares the epipoles rounding error.
@@ -228,29 +200,20 @@ def epipoles(F: ArrayLike) -> tuple[Array, Array]:
     return unit(D @ Vt[2]), unit(D @ U[:, 2])
 
 
-def epipolar_lines(F: ArrayLike, uv_left: ArrayLike) -> Array:
+def epipolar_lines(F: MatrixLike, uv_left: PixelsLike) -> Array:
     """Lines l = F x in the right image, on which the partners of left pixels lie.
 
     `epipolar_lines(F.T, uv_right)` goes back.
-
-    Args:
-        F: (3, 3), the fundamental matrix, on any scale.
-        uv_left: (..., 2), in pixels.
 
     Returns:
         (..., 3), a u + b v + c = 0 with a² + b² = 1, so that (a, b, c) · (u, v, 1) is a distance in pixels. NaN at the
         epipole, which has every line, and where the line is at infinity.
 
-    Raises: ValueError for another shape.
     Source: Hartley & Zisserman (2004), section 9.2.
 
     In a rectified pair it is the row v = 50:
 
-    >>> from camviz.cameras import Camera, Intrinsics
-    >>> from camviz.poses import RigidTransform
-    >>> left = Camera(Intrinsics(640, 480, 500, 500, 320, 240))
-    >>> right = left.at(RigidTransform.from_translation([1, 0, 0]))
-    >>> epipolar_lines(fundamental(left, right), [100, 50]).round(9)
+    >>> epipolar_lines([[0, 0, 0], [0, 0, 1], [0, -1, 0]], [100, 50])
     array([  0.,   1., -50.])
     """
     F, x = as_matrix(F, "F"), to_homogeneous(uv_left)
@@ -266,15 +229,10 @@ def _vanish(lines: Array, F: Array, x: Array) -> np.ndarray:
     return np.asarray(np.abs(lines[..., :2]).max(axis=-1) <= ROUNDED * terms[..., :2].max(axis=-1))
 
 
-def clip_lines(lines: ArrayLike, intrinsics: Intrinsics) -> Array:
+def clip_lines(lines: LinesLike, intrinsics: Intrinsics) -> Array:
     """The part of each line inside the image.
 
-    Args:
-        lines: (..., 3), a u + b v + c = 0 in pixels.
-        intrinsics: Of the image.
-
     Returns: (..., 2, 2), two end pixels, on the image's border; NaN for a line that misses the image.
-    Raises: ValueError for another shape.
 
     >>> from camviz.cameras import Intrinsics
     >>> clip_lines([0, 1, -50], Intrinsics(640, 480, 500, 500, 320, 240)).tolist()  # the row v = 50
@@ -294,14 +252,13 @@ def clip_lines(lines: ArrayLike, intrinsics: Intrinsics) -> Array:
     return foot[..., None, :] + np.moveaxis(ends, 0, -1)[..., None] * along[..., None, :]
 
 
-def epipolar_curve(left: Camera, right: Camera, uv_left: ArrayLike, distances: ArrayLike) -> Array:
+def epipolar_curve(left: Camera, right: Camera, uv_left: PixelsLike, distances: ArrayLike) -> Array:
     """Where the ray of a left pixel runs in the right picture, under any lens.
 
     A straight ray is a straight line to a perspective camera and a curve to every other.
 
     Args:
         left, right: With any lenses.
-        uv_left: (..., 2), in pixels.
         distances: (n,), in metres, along the ray from the left camera's centre; inf gives the ray's vanishing point.
 
     Returns: (..., n, 2), in pixels; NaN where the right camera has no image of it.
@@ -328,15 +285,10 @@ def epipolar_curve(left: Camera, right: Camera, uv_left: ArrayLike, distances: A
     return right.project(points)
 
 
-def line_distance(lines: ArrayLike, uv: ArrayLike) -> Array:
+def line_distance(lines: LinesLike, uv: PixelsLike) -> Array:
     """Distances of pixels from lines.
 
-    Args:
-        lines: (..., 3), a u + b v + c = 0 with a² + b² = 1, in pixels, as `epipolar_lines` gives them.
-        uv: (..., 2), in pixels.
-
     Returns: (...), in pixels, not negative.
-    Raises: ValueError for another shape.
 
     >>> line_distance([0.6, 0.8, -5], [10, 5])  # 6 + 4 - 5
     np.float64(5.0)
@@ -344,22 +296,15 @@ def line_distance(lines: ArrayLike, uv: ArrayLike) -> Array:
     return np.abs(np.sum(as_points(lines, 3, "lines") * to_homogeneous(uv), axis=-1))
 
 
-def symmetric_distance(F: ArrayLike, uv_left: ArrayLike, uv_right: ArrayLike) -> Array:
+def symmetric_distance(F: MatrixLike, uv_left: PixelsLike, uv_right: PixelsLike) -> Array:
     """How far pixels lie from each other's epipolar lines: √(d(x_right, F x_left)² + d(x_left, Fᵀ x_right)²).
 
-    Args:
-        F: (3, 3), the fundamental matrix, on any scale.
-        uv_left, uv_right: (..., 2), pairs in pixels.
-
     Returns: (...), in pixels.
-    Raises: ValueError for another shape.
     Source: Hartley & Zisserman (2004), eq. 11.10, of which it is the root of each term.
 
     In a rectified pair, rows that differ by 3 pixels do so in both pictures:
 
-    >>> from camviz.poses import RigidTransform
-    >>> F = essential(RigidTransform.from_translation([-1, 0, 0]))
-    >>> symmetric_distance(F, [100, 50], [90, 53]).round(3)  # 3 √2
+    >>> symmetric_distance([[0, 0, 0], [0, 0, 1], [0, -1, 0]], [100, 50], [90, 53]).round(3)  # 3 √2
     np.float64(4.243)
     """
     F = as_matrix(F, "F")
@@ -368,25 +313,18 @@ def symmetric_distance(F: ArrayLike, uv_left: ArrayLike, uv_right: ArrayLike) ->
     return np.hypot(in_left, in_right)
 
 
-def sampson_distance(F: ArrayLike, uv_left: ArrayLike, uv_right: ArrayLike) -> Array:
+def sampson_distance(F: MatrixLike, uv_left: PixelsLike, uv_right: PixelsLike) -> Array:
     """How far a pair of pixels must move, together and to first order, to satisfy F.
 
     abs(x_rightᵀ F x_left) / √((F x_left)₁² + (F x_left)₂² + (Fᵀ x_right)₁² + (Fᵀ x_right)₂²).
     cv2.sampsonDistance returns the square of this.
 
-    Args:
-        F: (3, 3), the fundamental matrix, on any scale.
-        uv_left, uv_right: (..., 2), pairs in pixels.
-
     Returns: (...), in pixels; 0 for the two epipoles, which satisfy F with every partner.
-    Raises: ValueError for another shape.
     Source: Hartley & Zisserman (2004), eq. 11.9, of which it is the root of a term.
 
     In a rectified pair, rows that differ by 3 pixels meet when each moves by 1.5:
 
-    >>> from camviz.poses import RigidTransform
-    >>> F = essential(RigidTransform.from_translation([-1, 0, 0]))
-    >>> sampson_distance(F, [100, 50], [90, 53]).round(3)  # 1.5 √2
+    >>> sampson_distance([[0, 0, 0], [0, 0, 1], [0, -1, 0]], [100, 50], [90, 53]).round(3)  # 1.5 √2
     np.float64(2.121)
     """
     F = as_matrix(F, "F")

@@ -7,6 +7,7 @@ from math import ceil, log, log1p
 import numpy as np
 from numpy.typing import ArrayLike
 
+from camviz.lenses.arrays import MatrixLike, PixelLength, Share
 from camviz.lenses.base import Array, as_points
 from camviz.poses import RigidTransform, Rotation
 from camviz.twoview.epipolar import sampson_distance, singular_values, to_homogeneous
@@ -96,11 +97,8 @@ def linear_fundamental(uv_left: ArrayLike, uv_right: ArrayLike) -> Array:
     return _scaled(Vt[-1].reshape(3, 3))
 
 
-def nearest_rank_two(F: ArrayLike) -> Array:
+def nearest_rank_two(F: MatrixLike) -> Array:
     """The matrix of rank 2 nearest to F in Frobenius norm: its smallest singular value set to 0.
-
-    Args:
-        F: (3, 3), a matrix on any scale.
 
     Returns: (3, 3), a fundamental matrix, on the scale of F.
     Raises: ValueError for another shape, and numbers that are not finite.
@@ -113,11 +111,8 @@ def nearest_rank_two(F: ArrayLike) -> Array:
     return U @ np.diag([s[0], s[1], 0]) @ Vt
 
 
-def nearest_essential(E: ArrayLike) -> Array:
+def nearest_essential(E: MatrixLike) -> Array:
     """The essential matrix nearest to E in Frobenius norm: two equal singular values and a zero.
-
-    Args:
-        E: (3, 3), a matrix on any scale.
 
     Returns: (3, 3), an essential matrix, on the scale of E.
     Raises: ValueError for another shape, and numbers that are not finite.
@@ -133,9 +128,9 @@ def nearest_essential(E: ArrayLike) -> Array:
 def ransac_fundamental(
     uv_left: ArrayLike,
     uv_right: ArrayLike,
-    threshold_px: float,
+    threshold_px: PixelLength,
     rng: np.random.Generator,
-    confidence: float = 0.999,
+    confidence: Share = 0.999,
     max_samples: int = 5000,
 ) -> tuple[Array, np.ndarray]:
     """The fundamental matrix of the pairs that agree on one, and which these are.
@@ -145,9 +140,6 @@ def ransac_fundamental(
 
     Args:
         uv_left, uv_right: (n, 2), pairs in pixels, some of them wrong; a pair with a NaN agrees with none.
-        threshold_px: In pixels.
-        rng: Draws the samples.
-        confidence: Between 0 and 1.
         max_samples: The most samples.
 
     Returns:
@@ -199,13 +191,10 @@ def _samples_needed(inlier_share: float, confidence: float) -> int:
     return 1 if inlier_share == 1 else ceil(log(1 - confidence) / log1p(-(inlier_share**8)))
 
 
-def decompose_essential(E: ArrayLike) -> list[RigidTransform]:
+def decompose_essential(E: MatrixLike) -> list[RigidTransform]:
     """The four motions that have the essential matrix ±E.
 
     E = U diag(1, 1, 0) Vᵀ: R is U W Vᵀ or U Wᵀ Vᵀ, t is the last column of U or its opposite. `recover_pose` chooses.
-
-    Args:
-        E: (3, 3), the essential matrix, on any scale.
 
     Returns: right_from_left = [R | t] with ‖t‖ = 1.
     Raises: ValueError where E has not two singular values above zero.
@@ -227,11 +216,10 @@ def decompose_essential(E: ArrayLike) -> list[RigidTransform]:
     return [RigidTransform.from_components(t, R) for R in rotations for t in (U[:, 2], -U[:, 2])]
 
 
-def recover_pose(E: ArrayLike, rays_left: ArrayLike, rays_right: ArrayLike) -> RigidTransform:
+def recover_pose(E: MatrixLike, rays_left: ArrayLike, rays_right: ArrayLike) -> RigidTransform:
     """Of E's four motions, the one with most points in front of both cameras.
 
     Args:
-        E: (3, 3), the essential matrix, on any scale.
         rays_left, rays_right: (n, 3), corresponding unit rays, each in its own camera's frame, through any lens:
             `camera.lens.unproject(camera.intrinsics.from_pixels(uv))`.
 

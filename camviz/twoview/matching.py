@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from camviz.lenses.arrays import PixelLength
 from camviz.lenses.base import Array
 
 METHODS = ("SGM", "BM", "SGM + WLS")
@@ -130,7 +131,7 @@ def matching_score(disparity: ArrayLike, truth: ArrayLike, threshold: float = 1.
     )
 
 
-def left_right_check(disparity_left: ArrayLike, disparity_right: ArrayLike, tolerance: float = 1.0) -> Array:
+def left_right_check(disparity_left: ArrayLike, disparity_right: ArrayLike, tolerance: PixelLength = 1.0) -> Array:
     """The left disparities on which both pictures agree.
 
     Pixel u of the left row says that its partner is u − d; the partner's own disparity must lead back. It does not for
@@ -138,7 +139,6 @@ def left_right_check(disparity_left: ArrayLike, disparity_right: ArrayLike, tole
 
     Args:
         disparity_left, disparity_right: (height, width), in pixels, both positive for points in front of the cameras.
-        tolerance: In pixels.
 
     Returns: (height, width), in pixels; NaN where they disagree by more.
     Raises: ValueError for two different shapes.

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from math import atan2
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from camviz.cameras import Camera, Intrinsics, rotate
 from camviz.lenses import Perspective
+from camviz.lenses.arrays import Depths, DepthsLike, DisparitiesLike, Metres, PixelLength
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 from camviz.twoview.epipolar import right_from_left
@@ -17,13 +17,12 @@ from camviz.twoview.epipolar import right_from_left
 BESIDE = 1e-9  # of the way in the other directions: less is rounding
 
 
-def depth_from_disparity(disparity: ArrayLike, focal_length: float, baseline: float, doffs: float = 0.0) -> Array:
+def depth_from_disparity(
+    disparity: DisparitiesLike, focal_length: PixelLength, baseline: Metres, doffs: float = 0.0
+) -> Array:
     """Depths Z = f B / (d + doffs) of disparities.
 
     Args:
-        disparity: (...), d = u_left − u_right in pixels.
-        focal_length: f in pixels.
-        baseline: B in metres.
         doffs: cx_right − cx_left in pixels, 0 in a pair that `rectify` made.
 
     Returns: (...), in metres; inf at d + doffs = 0 and NaN below it.
@@ -37,13 +36,10 @@ def depth_from_disparity(disparity: ArrayLike, focal_length: float, baseline: fl
         return np.where(d >= 0, focal_length * baseline / np.abs(d), np.nan)
 
 
-def disparity_from_depth(depth: ArrayLike, focal_length: float, baseline: float, doffs: float = 0.0) -> Array:
+def disparity_from_depth(depth: DepthsLike, focal_length: PixelLength, baseline: Metres, doffs: float = 0.0) -> Array:
     """Disparities d = f B / Z − doffs of depths.
 
     Args:
-        depth: (...), Z in metres.
-        focal_length: f in pixels.
-        baseline: B in metres.
         doffs: cx_right − cx_left in pixels.
 
     Returns: (...), in pixels; NaN at and behind the cameras.
@@ -56,16 +52,11 @@ def disparity_from_depth(depth: ArrayLike, focal_length: float, baseline: float,
     return focal_length * baseline / np.where(Z > 0, Z, np.nan) - doffs
 
 
-def depth_error(depth: ArrayLike, focal_length: float, baseline: float, disparity_error: float = 0.5) -> Array:
+def depth_error(
+    depth: DepthsLike, focal_length: PixelLength, baseline: Metres, disparity_error: PixelLength = 0.5
+) -> Depths:
     """The error of depth that an error of disparity makes, to first order: ΔZ = Z² Δd / (f B).
 
-    Args:
-        depth: (...), Z in metres.
-        focal_length: f in pixels.
-        baseline: B in metres.
-        disparity_error: Δd in pixels.
-
-    Returns: (...), in metres.
     Source: D. Gallup et al., Variable baseline/resolution stereo, CVPR 2008.
 
     Five times as far, 25 times as uncertain:
@@ -77,15 +68,9 @@ def depth_error(depth: ArrayLike, focal_length: float, baseline: float, disparit
 
 
 def depth_interval(
-    depth: ArrayLike, focal_length: float, baseline: float, disparity_error: float = 0.5
+    depth: DepthsLike, focal_length: PixelLength, baseline: Metres, disparity_error: PixelLength = 0.5
 ) -> tuple[Array, Array]:
     """The nearest and farthest depths that an error of disparity allows: exact, where `depth_error` is not.
-
-    Args:
-        depth: (...), in metres.
-        focal_length: In pixels.
-        baseline: In metres.
-        disparity_error: Either way, in pixels.
 
     Returns:
         nearest: (...), in metres.
@@ -133,14 +118,8 @@ class RectifiedPair:
         """B in metres."""
         return float(np.linalg.norm(self.right.centre - self.left.centre))
 
-    def depth(self, disparity: ArrayLike) -> Array:
-        """Depths Z = f B / d of disparities.
-
-        Args:
-            disparity: (...), d = u_left − u_right in pixels.
-
-        Returns: (...), in metres, as `depth_from_disparity` gives them.
-        """
+    def depth(self, disparity: DisparitiesLike) -> Depths:
+        """Depths Z = f B / d of disparities."""
         return depth_from_disparity(disparity, self.focal_length, self.baseline)
 
     def maps(self) -> tuple[Array, Array]:
@@ -164,7 +143,6 @@ def rectify(left: Camera, right: Camera, intrinsics: Intrinsics | None = None) -
         intrinsics: Of both pictures; without them these keep the left one's size and the smallest focal length, and
             look where the originals look.
 
-    Returns: The two cameras, and what they are made of.
     Raises: ValueError when `right` does not stand to the right, and when the originals look along the baseline.
     Source: G. Bradski and A. Kaehler, Learning OpenCV (2008), chapter 12; Szeliski (2022), section 12.1.1.
 

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from camviz.cameras import Camera, rotate
+from camviz.lenses.arrays import PixelsOfEachLike
 from camviz.lenses.base import Array, as_points
 from camviz.poses import RigidTransform
 from camviz.twoview.epipolar import from_homogeneous, projection_matrix
 
 
-def triangulate(cameras: Sequence[Camera], uvs: ArrayLike) -> Array:
+def triangulate(cameras: Sequence[Camera], uvs: PixelsOfEachLike) -> Array:
     """World points nearest to the rays of pixels, under any lens.
 
     It minimises the sum of squared distances to the rays: for two views, the point is the midpoint of their common
@@ -21,7 +22,6 @@ def triangulate(cameras: Sequence[Camera], uvs: ArrayLike) -> Array:
 
     Args:
         cameras: 2 or more, in different places.
-        uvs: (cameras, ..., 2), uvs[i] are pixels of cameras[i].
 
     Returns:
         (..., 3), in metres; NaN where the rays are parallel (a point at infinity), diverge (they meet behind a camera),
@@ -53,14 +53,13 @@ def triangulate(cameras: Sequence[Camera], uvs: ArrayLike) -> Array:
     return _keep_in_front(cameras, rays, origin + _least_squares(A, b))
 
 
-def triangulate_linear(cameras: Sequence[Camera], uvs: ArrayLike) -> Array:
+def triangulate_linear(cameras: Sequence[Camera], uvs: PixelsOfEachLike) -> Array:
     """World points by the direct linear transform on perspective cameras: A X = 0.
 
     It minimises no distance in particular; `refine_points` does.
 
     Args:
         cameras: 2 or more, in different places, with perspective lenses.
-        uvs: (cameras, ..., 2), uvs[i] are pixels of cameras[i].
 
     Returns: (..., 3), in metres; NaN as of `triangulate`.
     Raises: ValueError as of `triangulate`, and for any lens that bends.
@@ -84,12 +83,11 @@ def triangulate_linear(cameras: Sequence[Camera], uvs: ArrayLike) -> Array:
     return _keep_in_front(cameras, _rays(cameras, uvs), from_homogeneous(X))
 
 
-def refine_points(cameras: Sequence[Camera], uvs: ArrayLike, points_world: ArrayLike, steps: int = 20) -> Array:
+def refine_points(cameras: Sequence[Camera], uvs: PixelsOfEachLike, points_world: ArrayLike, steps: int = 20) -> Array:
     """World points moved to the least sum of squared reprojection errors, under any lens, by Gauss–Newton.
 
     Args:
         cameras: 2 or more, in different places.
-        uvs: (cameras, ..., 2), uvs[i] are pixels of cameras[i].
         points_world: (..., 3), where to begin, in metres, say from `triangulate`.
         steps: At most so many.
 

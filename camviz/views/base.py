@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import Field, dataclass, field, fields, replace
 from functools import cached_property
 from math import inf
@@ -12,16 +12,13 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from camviz.draw import svg
 from camviz.draw.flow import Cell, Tile
 from camviz.draw.orbit_camera import OrbitCamera
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
 from camviz.draw.space import Item, draw_space
-from camviz.views.yours import YOURS_HERE, is_unwritten, tried
+from camviz.views.yours import Function, answered, without  # noqa: F401 - asked for here, beside the base of views
 
-Function = Callable[..., Any]
-"""What a reader writes."""
 Drawn = tuple[str, dict[str, bytes]]
 """A part of a picture, and the photographs that it needs."""
 ORBIT_HANDLES = ("eye", "orbit")
@@ -243,26 +240,6 @@ def positive(view: View, *names: str) -> None:
 def step_of(key: str) -> int:
     """1 for a key that leads onwards (right, up, plus), -1 for one that leads back, 0 for any other."""
     return {"ArrowRight": 1, "ArrowUp": 1, "+": 1, "ArrowLeft": -1, "ArrowDown": -1, "-": -1}.get(key, 0)
-
-
-def answered(function: Function | None, arguments: tuple[Any, ...], like: Any) -> tuple[Any, str]:
-    """What a reader's function answers, in the shape of `like`, and what is wrong with it; NaN where there is none."""
-    if function is None:
-        like = np.asarray(like, dtype=float)
-        return np.full(like.shape, np.nan), "No function of yours has been given."
-    return tried(function, arguments, like)
-
-
-def without(panel: Panel, problem: str, title: str, at: tuple[float, float] = (12, 26), right: str = "") -> str:
-    """The panel with the sentence that says why it is empty.
-
-    Where the reader has written nothing yet and `right` is what a right function would show there, the panel shows that
-    greyed, and says whose place it is.
-    """
-    if right and is_unwritten(problem):
-        words = svg.text((panel.width / 2, panel.height / 2), YOURS_HERE, "title halo middle")
-        return panel.show(svg.group(right, class_="awaited") + words, title=title)
-    return panel.show(svg.paragraph(at, problem, panel.width - 2 * at[0]), title=title)
 
 
 def _labelled(declared: Field[Any]) -> Control:

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from camviz.lenses.arrays import ImagePointsLike, Rays
 from camviz.lenses.base import Array, Lens, as_points, on_plane, unit
 
 _ROUNDS = 10
@@ -26,14 +26,8 @@ class WrittenLens(Lens):
     bend: Callable[[Array], Array]
     like: Lens
 
-    def unproject(self, xy: ArrayLike) -> Array:
-        """The rays of image points, all in one call of the function: it may have been written for all at once.
-
-        Args:
-            xy: (..., 2), image points in focal lengths.
-
-        Returns: (..., 3), unit rays; NaN where no ray before a fold arrives.
-        """
+    def unproject(self, xy: ImagePointsLike) -> Rays:
+        """The rays of image points, all in one call of the function: it may have been written for all at once."""
         return unit(on_plane(self.straightened(as_points(xy, 2, "xy"))))
 
     def straightened(self, xy: Array) -> Array:

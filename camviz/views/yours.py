@@ -14,11 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from camviz.draw import prose
+from camviz.draw import prose, svg
+from camviz.draw.panel import Panel
 from camviz.views.calls import as_arrays, attribute, contained, explain, stopped
 from camviz.views.patience import Patience, TimeIsUp
 
 Function = Callable[..., Any]
+"""What a reader writes."""
 
 YOURS_HERE = "yours appears here"
 """What stands over the right picture, greyed, where a reader's own will be."""
@@ -124,6 +126,26 @@ def is_unwritten(problem: str) -> bool:
     True
     """
     return any(f" {words}, " in problem for words in _NOT_YET)
+
+
+def answered(function: Function | None, arguments: tuple[Any, ...], like: Any) -> tuple[Any, str]:
+    """What a reader's function answers, in the shape of `like`, and what is wrong with it; NaN where there is none."""
+    if function is None:
+        like = np.asarray(like, dtype=float)
+        return np.full(like.shape, np.nan), "No function of yours has been given."
+    return tried(function, arguments, like)
+
+
+def without(panel: Panel, problem: str, title: str, at: tuple[float, float] = (12, 26), right: str = "") -> str:
+    """The panel with the sentence that says why it is empty.
+
+    Where the reader has written nothing yet and `right` is what a right function would show there, the panel shows that
+    greyed, and says whose place it is.
+    """
+    if right and is_unwritten(problem):
+        words = svg.text((panel.width / 2, panel.height / 2), YOURS_HERE, "title halo middle")
+        return panel.show(svg.group(right, class_="awaited") + words, title=title)
+    return panel.show(svg.paragraph(at, problem, panel.width - 2 * at[0]), title=title)
 
 
 def _answers(

@@ -113,7 +113,6 @@ class Explorer(StillWidget):
         Args:
             **changes: Fields of the view, and their values.
 
-        Returns: Itself.
         Raises: ValueError for what cannot be drawn: it is raised here, where the code is.
         """
         self._show(self.view.but(**changes), draft=False)

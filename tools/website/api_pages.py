@@ -7,6 +7,7 @@ from importlib import import_module
 from inspect import getdoc
 from pathlib import Path
 from types import GenericAlias, ModuleType
+from typing import Annotated, get_origin
 
 import camviz
 
@@ -49,7 +50,19 @@ def offered(name: str) -> list[str]:
         key for key, value in vars(module).items() if key[0] != "_" and getattr(value, "__module__", "") == name
     ]
     hidden = (ModuleType, GenericAlias)
-    return [one for one in names if one[0] != "_" and not isinstance(getattr(module, one), hidden)]
+    shown = [one for one in names if one[0] != "_" and one not in aliases(name)]
+    return [one for one in shown if not isinstance(getattr(module, one), hidden)]
+
+
+def aliases(name: str) -> dict[str, str]:
+    """The names for arrays that a part offers, and what each says of shape and unit.
+
+    >>> aliases("camviz.lenses.arrays")["Points"]
+    '(..., 3), points in metres.'
+    """
+    module = import_module(name)
+    values = {one: getattr(module, one) for one in getattr(module, "__all__", ())}
+    return {one: value.__metadata__[0] for one, value in values.items() if get_origin(value) is Annotated}
 
 
 def home(name: str, one: str) -> str:
@@ -66,7 +79,9 @@ def _part(name: str) -> str:
     elsewhere = [f"~{place}.{one}" for one, place in homes.items() if place != name]
     rst = [f".. currentmodule:: {name}", f".. automodule:: {name}\n   :no-members:\n   :no-index:"]
     rst += [_summary(own, "   :toctree: generated\n")] * bool(own) + [_summary(elsewhere)] * bool(elsewhere)
-    return f"# {name}\n\n```{{eval-rst}}\n" + "\n\n".join(rst) + "\n```\n"
+    rows = "".join(f"| `{one}` | {said} |\n" for one, said in aliases(name).items())
+    table = f"\n| Name | Shape and unit |\n|---|---|\n{rows}" if rows else ""
+    return f"# {name}\n\n```{{eval-rst}}\n" + "\n\n".join(rst) + f"\n```\n{table}"
 
 
 def _summary(names: list[str], toctree: str = "") -> str:

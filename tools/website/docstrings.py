@@ -6,7 +6,7 @@ import inspect
 import re
 import sys
 from itertools import takewhile
-from typing import Any
+from typing import Annotated, Any, get_origin
 
 from sphinx.application import Sphinx
 from sphinx.ext.napoleon import Config, NumpyDocstring
@@ -32,7 +32,7 @@ def _process(_app: Any, what: str, name: str, value: Any, _options: Any, lines: 
     if what == "data":
         lines[:] = of_constant(name, value)
     is_of_scipy = any(_UNDERLINE.fullmatch(line) for line in lines)
-    lines[:] = of_numpydoc(name, lines) if is_of_scipy else as_page(lines)
+    lines[:] = of_numpydoc(name, lines) if is_of_scipy else as_page(lines) + of_arrays(value)
 
 
 def _signature(_app: Any, _what: str, _name: str, value: Any, *_rest: Any) -> tuple[str, str | None] | None:
@@ -45,6 +45,25 @@ def _signature(_app: Any, _what: str, _name: str, value: Any, *_rest: Any) -> tu
     returned = None if said.return_annotation is said.empty or inspect.isclass(value) else said.return_annotation
     bare = said.replace(parameters=given, return_annotation=said.empty)
     return stringify_signature(bare), None if returned is None else stringify_annotation(returned)
+
+
+def of_arrays(value: Any) -> list[str]:
+    """What the names for arrays in a function's signature say of shape and unit, as a field below its docstring.
+
+    >>> import camviz
+    >>> of_arrays(camviz.Intrinsics.to_pixels)[-2:]
+    ['    * ``Pixels`` – (..., 2), pixels (u, v), whose centres are integers.', '']
+    """
+    try:
+        said = inspect.signature(value)
+    except (TypeError, ValueError):  # such as a constant
+        return []
+    module = vars(sys.modules.get(getattr(value, "__module__", ""), sys))
+    names = dict.fromkeys(str(each.annotation) for each in said.parameters.values())
+    names |= {str(said.return_annotation): None}
+    aliases = {name: module[name] for name in names if get_origin(module.get(name)) is Annotated}
+    items = [f"    * ``{name}`` – {alias.__metadata__[0]}" for name, alias in aliases.items()]
+    return ["", ":Arrays:", *items, ""] if items else []
 
 
 def of_numpydoc(name: str, lines: list[str]) -> list[str]:
