@@ -131,6 +131,8 @@ def test_the_camera_is_known_within_half_a_per_cent_and_then_off(notebook):
     wait_until(notebook, "d.state === 'done'")
     assert page.inner_text(".camviz-capture .sentence").startswith("The goal is reached: fx = 5")
     assert page.eval_on_selector("video", "video => video.srcObject.getTracks().every(t => t.readyState === 'ended')")
+    assert page.is_visible(".camviz-capture .frame")  # the last frame stays: a video without its camera is black
+    assert page.is_hidden(".camviz-capture video")
     fx, fy, views, delays = map(float, page.evaluate(EXECUTE, TOLD).split())
     assert fx == pytest.approx(TRUTH.intrinsics.fx, rel=0.005)
     assert fy == pytest.approx(TRUTH.intrinsics.fy, rel=0.005)
