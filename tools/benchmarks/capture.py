@@ -1,10 +1,12 @@
-"""Guided against unguided calibration of a webcam: `python tools/benchmarks/capture.py [--novices 20] [--guided] [--drawn]`.
+"""Guided against unguided calibration of a webcam: `python tools/benchmarks/capture.py [--guided] [--drawn]`.
 
 Each novice holds a board before a virtual webcam whose truth is known; the frames are rendered, and go through
 `camviz_clinic.live.Session` as a notebook's do. The same novices without a ghost hold it as hands do: in the middle,
 tilted a little. Their views count up to the same goal. Held-out errors are over boards all over the picture, whose
-poses are fitted and whose corners are exact. With --drawn no picture is rendered: corners are the exact ones and noise of
-0.06 px, of boards that are whole and tilted by less than 58 degrees. That takes seconds for a novice in place of minutes.
+poses are fitted and whose corners are exact.
+
+With --drawn no picture is rendered: corners are the exact ones and noise of 0.06 px, of boards that are whole and
+tilted by less than 58 degrees. That takes seconds for a novice in place of minutes.
 """
 
 from __future__ import annotations
