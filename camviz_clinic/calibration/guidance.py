@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 from math import inf
@@ -24,6 +24,7 @@ POSITIONS = (0.1, 0.3, 0.5, 0.7, 0.9)  # of the board's middle, in the image's w
 SIZES = (0.25, 0.4, 0.6, 0.85)  # of the board, held straight, in the image's width
 TILTS = (25.0, 45.0)  # degrees, beside 0; beyond these corners are no longer found well
 AXES = 8  # directions to tilt the board in
+RIM = 0.06  # of the picture's width, that the board stays away from its rim: a hand that is off keeps it whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,29 +96,47 @@ def candidate_poses(camera: Camera, board: Board) -> RigidTransform:
 
     The whole of it, with the squares around the outer corners. Raises ValueError where no pose does.
     """
-    poses = RigidTransform.concatenate(list(_poses(camera, board)))
+    k = camera.intrinsics
+    places = [(x * k.width, y * k.height, size) for x, y in product(POSITIONS, POSITIONS) for size in SIZES]
+    return _whole_at(camera, board, places)
+
+
+def rim_poses(camera: Camera, board: Board) -> RigidTransform:
+    """`candidate_poses` that reach the picture's rim and corners in every size: nine places for each.
+
+    The middles of those lie on one grid, so that a small board stays away from the rim.
+    """
+    k, shape = camera.intrinsics, (board.area[3] - board.area[1]) / (board.area[2] - board.area[0])
+    places = []
+    for size in SIZES:
+        left, top = (0.5 * size + RIM) * k.width, (0.5 * size * shape + RIM) * k.width
+        xs, ys = (left, k.width / 2, k.width - left), (top, k.height / 2, k.height - top)
+        places += [(x, y, size) for x, y in product(xs, ys)]
+    return _whole_at(camera, board, places)
+
+
+def _whole_at(camera: Camera, board: Board, places: Iterable[tuple[float, float, float]]) -> RigidTransform:
+    poses = RigidTransform.concatenate(list(_poses(camera, board, places)))
     whole = shows_whole(camera, board, poses)
     if not whole.any():
         raise ValueError(f"no pose of a board of {board.columns} × {board.rows} corners is whole in the picture")
     return poses[whole]
 
 
-def _poses(camera: Camera, board: Board) -> Iterator[RigidTransform]:
-    """The board at every place in the picture and in every size, in all its tilts."""
+def _poses(camera: Camera, board: Board, places: Iterable[tuple[float, float, float]]) -> Iterator[RigidTransform]:
+    """The board in all its tilts, with its middle at pixels (x, y) and of that size, for each (x, y, size)."""
     pixels, middle = camera.intrinsics, board.corners.mean(axis=0)
     azimuth = np.arange(AXES) * 2 * np.pi / AXES
     axes = np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], axis=-1)
     turns = [np.zeros((1, 3)), *(np.radians(tilt) * axes for tilt in TILTS)]
     tilted = Rotation.from_rotvec(np.concatenate(turns))
     width = board.area[2] - board.area[0]
-    for x, y in product(POSITIONS, POSITIONS):
-        uv = [x * pixels.width - 0.5, y * pixels.height - 0.5]
-        ray = camera.lens.unproject(pixels.from_pixels(uv))
+    for x, y, size in places:
+        ray = camera.lens.unproject(pixels.from_pixels([x - 0.5, y - 0.5]))
         if np.isfinite(ray).all():
             turned = Rotation.align_vectors(ray, [0, 0, 1])[0] * tilted
-            for size in SIZES:
-                distance = pixels.fx * width / (size * pixels.width)
-                yield RigidTransform.from_components(distance * ray - turned.apply(middle), turned)
+            distance = pixels.fx * width / (size * pixels.width)
+            yield RigidTransform.from_components(distance * ray - turned.apply(middle), turned)
 
 
 def shows_whole(camera: Camera, board: Board, cam_from_board: RigidTransform) -> np.ndarray:

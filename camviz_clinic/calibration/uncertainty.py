@@ -58,10 +58,20 @@ def largest_expected_error(adjustment: Adjustment, camera: str | None = None) ->
     The Max ERE of AprilCal (Richardson, Strom & Olson 2013, sec. IV): there as a rule for when enough pictures have
     been taken, at 1 px, and from samples; here from `projection_covariance`. NaN where no pixel of the grid has a ray.
     """
+    expected = expected_errors(adjustment, camera)[1]
+    return float(np.max(expected)) if expected.size else nan
+
+
+def expected_errors(adjustment: Adjustment, camera: str | None = None) -> tuple[Array, Array]:
+    """The pixels uv (n, 2) of a grid on the picture that have a ray, and the expected errors (n,) of a far point there.
+
+    Both in pixels; the largest is `largest_expected_error`.
+    """
     name = next(iter(adjustment.cameras)) if camera is None else camera
     uv = pixel_grid(adjustment.cameras[name].intrinsics, (12, 9)).reshape(-1, 2)
     expected = expected_length(projection_covariance(adjustment, uv, camera=name))
-    return float(np.max(expected[np.isfinite(expected)], initial=0)) if np.isfinite(expected).any() else nan
+    has_ray = np.isfinite(expected)
+    return uv[has_ray], expected[has_ray]
 
 
 def mean_deviation(covariance: Array) -> Array:

@@ -23,7 +23,7 @@ function render({ model, el }) {
     <div class="camviz-beside"><div class="camviz-row"><button type="button" class="start">Start</button><button type="button" class="stop" disabled>Stop</button>
     <label><input type="checkbox" class="mirror" checked> mirror</label></div>
     <p class="sentence" role="status"></p><p class="error" role="alert" hidden></p>
-    <p class="numbers"></p><svg viewBox="0 0 240 90" role="img" aria-label="σ of fx by the number of views"></svg><p class="promise"></p></div>`;
+    <p class="numbers"></p><svg viewBox="0 0 240 94" role="img" aria-label="σ of fx by the number of views"></svg><p class="promise"></p></div>`;
   const find = (query) => root.querySelector(query);
   const [video, frame, overlay] = [find("video"), find(".frame"), find(".overlay")];
   const hidesStill = Object.assign(document.createElement("style"), { textContent: model.get("still_hidden") });
@@ -44,6 +44,7 @@ function render({ model, el }) {
     [running, underWay] = [false, null];
     clearTimeout(late);
     stream?.getTracks().forEach((track) => { track.onended = null; track.stop(); });
+    if (stream && number) [video.hidden, frame.hidden] = [true, false];      // a video without its camera is black
     stream = null;
     if (root.dataset.state === "live") root.dataset.state = "idle";
     [find(".start").disabled, find(".stop").disabled] = [false, true];
@@ -154,7 +155,7 @@ function tell(root, { sentence, known, views, coverage, done }) {
   const [, fx, sigma, largest] = known.at(-1) ?? [];
   const focal = fx === undefined ? "fx not known yet" : `fx = ${fx.toFixed(1)} px ± ${sigma === null ? "not known" : sigma.toPrecision(2)}`;
   const worst = largest ? ` · largest expected error ${largest.toPrecision(2)} px` : "";
-  root.querySelector(".numbers").textContent = `${views} views · ${Math.round(100 * coverage)} % covered · ${focal}${worst}`;
+  root.querySelector(".numbers").textContent = `${views} ${views === 1 ? "view" : "views"} · ${Math.round(100 * coverage)} % covered · ${focal}${worst}`;
   if (known.length && root.dataset.plotted !== String(known.length)) plot(root.querySelector("svg"), known);
   Object.assign(root.dataset, { plotted: known.length, views, done });
 }
@@ -168,7 +169,7 @@ function plot(svg, all) {
   const dots = logs.map((log, i) => `<circle cx="${x(i)}" cy="${y(log)}" r="3"/>`).join("");
   const line = `<polyline points="${logs.map((log, i) => `${x(i)},${y(log)}`).join(" ")}"/>`;
   const marks = [top, bottom].map((log) => `<text x="34" y="${y(log) + 4}" text-anchor="end">${10 ** log}</text>`).join("");
-  svg.innerHTML = `${line}${dots}${marks}<text x="40" y="88">σ of fx in px, by ${known[0][0]} to ${known.at(-1)[0]} views</text>`;
+  svg.innerHTML = `${line}${dots}${marks}<text x="40" y="88">σ of fx in px, by ${known.length > 1 ? `${known[0][0]} to ` : ""}${known.at(-1)[0]} views</text>`;
 }
 
 export default { render };
