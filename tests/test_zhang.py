@@ -9,7 +9,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.twoview import homography
 from camviz_clinic.calibration.types import Board
-from camviz_clinic.calibration.zhang import board_pose, camera_matrix, constraints, focal_lengths
+from camviz_school.views.zhang import board_pose, camera_matrix, constraints, focal_lengths
 
 BOARD = Board(9, 6, 0.025)
 XY = BOARD.corners[:, :2]

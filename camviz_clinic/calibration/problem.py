@@ -139,6 +139,15 @@ class Problem:
         """Of the distances between observed and projected corners, in pixels, as OpenCV has it: √(2 ‖x‖²/N)."""
         return float(np.sqrt(2 * self.sum_of_squares / max(self.measurements, 1)))
 
+    def view_rms(self, name: str) -> Array:
+        """The same of each view of camera `name`, in pixels (views,): over its corners that have a say, or over all of
+        them where none has; NaN where it shows none."""
+        squared = np.sum(self.residuals[name] ** 2, axis=-1)
+        used = self.used[name]
+        counted = np.where(used.any(axis=1, keepdims=True), used, np.isfinite(squared))
+        count = counted.sum(axis=1)
+        return np.sqrt(np.sum(squared, axis=1, where=counted) / np.where(count, count, np.nan))
+
     @property
     def at_work(self) -> dict[str, DenominatorPrior]:
         """The priors by camera, of those whose denominator is free."""
