@@ -74,8 +74,12 @@ _MOVED = (
     ("camviz", "camviz_school", "course join record room samples server teaching"),
     ("camviz.optics", "camviz_clinic.measuring.sharpness", _MEASURED_EDGES),
     ("camviz.sensors", "camviz_clinic.measuring.noise", _MEASURED_NOISE),
+    ("camviz.scenes", "camviz_school.views", "aperture balloon parallax walk"),
     ("camviz.views", "camviz_clinic.views", "measured_edge measured_noise"),
     ("camviz.views", "camviz_school.views", _BESIDE_LESSONS),
+    ("camviz_clinic.calibration", "camviz_school.views", "focal_xi_ambiguity zhang"),
+    ("camviz_clinic.calibration", "camviz_clinic.calibration", "residual_statistics:problem"),
+    ("camviz_clinic.checks", "camviz_school.views", "laboratory"),
     ("camviz_clinic.views", "camviz_school.views", _CALIBRATIONS),
 )
 """What once stood elsewhere: the old place, the new one, and the names; `old:new` where that is another one."""

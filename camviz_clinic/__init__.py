@@ -19,6 +19,8 @@ import sys
 from importlib import import_module
 from typing import Any
 
+import camviz  # noqa: F401 - it answers whoever imports what has moved
+
 _HOME = {
     "Calibration": "camviz_clinic.calibration",
     "capture": "camviz_clinic.live.widget",

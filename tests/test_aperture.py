@@ -9,8 +9,9 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz import optics
 from camviz.cameras import Intrinsics
-from camviz.scenes import Rectangle, Scene, Texture, aperture, parallax, render, textured_scene, to_display
-from camviz.scenes.aperture import Aperture, ThinLensCamera, spiral
+from camviz.scenes import Rectangle, Scene, Texture, render, textured_scene, to_display
+from camviz_school.views import aperture, parallax
+from camviz_school.views.aperture import Aperture, ThinLensCamera, spiral
 
 BLACK, WHITE = Texture.plain((0, 0, 0)), Texture.plain((1, 1, 1))
 PLACE = RigidTransform.from_translation([0.5, 0.5, 1.0])  # in the garden, 2.3 m from the globe

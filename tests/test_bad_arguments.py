@@ -13,9 +13,9 @@ from camviz.views.distortion import DistortionView
 from camviz.widgets import explore
 from camviz_clinic import plots
 from camviz_clinic.calibration import Board, Detections, calibrate, detect, find_corners
-from camviz_clinic.calibration.zhang import board_pose, focal_lengths
 from camviz_clinic.checks import inspect
 from camviz_clinic.files.corners import load_corners
+from camviz_school.views.zhang import board_pose, focal_lengths
 
 CAMERA = Camera(Intrinsics.from_fov(64, 48, 60))
 BOARD = Board(9, 6, 0.025)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from camviz import optics
-from camviz.scenes import aperture, to_display
-from camviz_school.views import lens_diagram
+from camviz.scenes import to_display
+from camviz_school.views import aperture, lens_diagram
 from camviz_school.views.depth_of_field import DepthOfFieldView
 from camviz_school.views.garland import GLOBE_M, garden_at_dusk, garden_with_lamps
 from camviz_school.views.lens_elements import LensElementsView

@@ -7,9 +7,9 @@ import pytest
 from camviz.cameras import Camera, Intrinsics
 from camviz_clinic.calibration.difference import difference
 from camviz_clinic.checks import faults
-from camviz_clinic.checks.laboratory import VIEWS, experiment, lab_faults
 from camviz_school.course.material import module
 from camviz_school.views.fault_lab import FaultLabView, grouped
+from camviz_school.views.laboratory import VIEWS, experiment, lab_faults
 from camviz_school.views.ward import COMPLAINTS, HEALTHY, Ward
 
 lesson16 = module("16")

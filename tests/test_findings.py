@@ -127,7 +127,8 @@ def test_a_shifted_principal_point_hides_from_the_error_but_not_from_held_out_co
     poses = Adjustment.of(wrong).refined(only_poses=True)
     assert poses.rms == pytest.approx(0.71, abs=0.02)
     wrong = replace(wrong, cam_from_board={"camera": poses.first_from_board})
-    assert held_out_ratio(Evidence(left_classic).observed["camera"]) < 2
+    evidence = Evidence(left_classic)
+    assert held_out_ratio(evidence, evidence.observed["camera"]) < 2
     assert one(inspect(wrong), "pose-absorbs-error").value > 4
 
 

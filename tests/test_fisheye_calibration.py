@@ -10,9 +10,9 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import KannalaBrandt
 from camviz.scenes import board_corners, snapshot, textured_scene
 from camviz.scenes.standard import SQUARE
-from camviz.scenes.walk import around_board
 from camviz_clinic.calibration import Detections, calibrate, detect
 from camviz_clinic.files import Board
+from camviz_school.views.walk import around_board
 
 TUM_VI = Camera(
     Intrinsics(1024, 1024, 379.045, 379.008, 505.512, 509.969).within(640),

@@ -12,9 +12,8 @@ from camviz.scenes import Scene, Texture, render, to_display
 from camviz.scenes.paint import checkerboard
 from camviz.scenes.surfaces import Rectangle
 from camviz_clinic.calibration import Detections, calibrate, find_corners
-from camviz_clinic.calibration.focal_xi_ambiguity import focal_xi_ambiguity
 from camviz_clinic.files import Board
-from camviz_school.views.focal_xi_ambiguity import focal_xi_ambiguity_picture
+from camviz_school.views.focal_xi_ambiguity import focal_xi_ambiguity, focal_xi_ambiguity_picture
 
 BOARD = Board(8, 5, 0.03)
 CAMERA = Camera(Intrinsics(800, 640, 560, 563, 402, 317), UnifiedSphere(1.1))

@@ -8,7 +8,7 @@ import pytest
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.scenes import Scene, render, textured_scene, to_display
-from camviz.scenes.balloon import BALLOON, balloon_rim, balloon_scene, towards_balloon
+from camviz_school.views.balloon import BALLOON, balloon_rim, balloon_scene, towards_balloon
 from camviz_school.views.camera_matrix import GLOBE, GLOBE_RADIUS
 from camviz_school.views.intrinsics import IntrinsicsView
 

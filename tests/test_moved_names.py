@@ -29,7 +29,7 @@ def test_the_new_place_is_there(new):
     assert find_spec(new) or hasattr(importlib.import_module(package), name)
 
 
-@pytest.mark.parametrize("part", ["camviz", "camviz.optics", "camviz.sensors", "camviz.views"])
+@pytest.mark.parametrize("part", ["camviz", "camviz.optics", "camviz.scenes", "camviz.sensors", "camviz.views"])
 def test_a_name_that_never_was_here_is_told_as_python_tells_it(part):
     with pytest.raises(AttributeError, match=f"module '{part}' has no attribute 'lode'"):
         importlib.import_module(part).lode  # noqa: B018 - it raises

@@ -1,5 +1,7 @@
 """Zhang's closed form: exact on exact boards, the same as OpenCV's where that has it, and silent where boards are."""
 
+import doctest
+
 import cv2
 import numpy as np
 import pytest
@@ -9,7 +11,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.twoview import homography
 from camviz_clinic.calibration.types import Board
-from camviz_clinic.calibration.zhang import board_pose, camera_matrix, constraints, focal_lengths
+from camviz_school.views import zhang
+from camviz_school.views.zhang import board_pose, camera_matrix, constraints, focal_lengths
 
 BOARD = Board(9, 6, 0.025)
 XY = BOARD.corners[:, :2]
@@ -181,3 +184,9 @@ def test_the_pose_from_noisy_corners_is_near_solvepnp_s(seed):
     _, rvec, t = cv2.solvePnP(BOARD.corners, uv, K, None)
     assert np.linalg.norm(found.translation - t.ravel()) < 0.01 * np.linalg.norm(t)
     assert (found.rotation * Rotation.from_rotvec(rvec.ravel()).inv()).magnitude() < np.radians(1.5)
+
+
+def test_its_examples_come_out_as_they_say():
+    done = doctest.testmod(zhang, optionflags=doctest.NORMALIZE_WHITESPACE)
+    assert done.attempted > 10
+    assert done.failed == 0

@@ -12,6 +12,7 @@ from scipy.special import chdtrc
 from camviz.lenses.base import Array
 from camviz_clinic.calibration.adjustment import SETTLED, Adjustment
 from camviz_clinic.calibration.difference import Difference, difference, pixel_grid
+from camviz_clinic.calibration.problem import rms_by_view
 from camviz_clinic.calibration.types import Board, Mask
 from camviz_clinic.calibration.uncertainty import mean_deviation, projection_covariance
 
@@ -107,9 +108,7 @@ class HeldOut:
     @property
     def per_view(self) -> Array:
         """The RMS of every view (views,); NaN for a view without a say."""
-        squares = np.sum(self.residuals**2, axis=-1)
-        count = np.isfinite(squares).sum(axis=(0, 2))
-        return np.sqrt(np.nansum(squares, axis=(0, 2)) / np.where(count, count, np.nan))
+        return rms_by_view(np.concatenate(np.sum(self.residuals**2, axis=-1), axis=1))
 
 
 def held_out(adjustment: Adjustment, *, folds: int | None = None, camera: str | None = None) -> HeldOut:

@@ -139,6 +139,12 @@ class Problem:
         """Of the distances between observed and projected corners, in pixels, as OpenCV has it: √(2 ‖x‖²/N)."""
         return float(np.sqrt(2 * self.sum_of_squares / max(self.measurements, 1)))
 
+    def view_rms(self, name: str) -> Array:
+        """The same of each view of camera `name`, in pixels (views,): over its corners that have a say, or over all of
+        them where none has; NaN where it shows none."""
+        squares, used = np.sum(self.residuals[name] ** 2, axis=-1), self.used[name]
+        return rms_by_view(np.where(used.any(axis=1, keepdims=True) & ~used, np.nan, squares))
+
     @property
     def at_work(self) -> dict[str, DenominatorPrior]:
         """The priors by camera, of those whose denominator is free."""
@@ -207,6 +213,16 @@ class Problem:
     def using(self, used: Mapping[str, Mask]) -> Self:
         """The same problem in which only these corners (views, corners), by camera, have a say."""
         return replace(self, set_aside={name: ~(used[name] & self.used[name]) for name in self.cameras})
+
+
+def rms_by_view(squares: Array) -> Array:
+    """The root of the mean over each view's numbers, (views,) of squares (views, n); NaN for a view without any.
+
+    >>> rms_by_view(np.array([[9.0, 16.0, np.nan], [np.nan, np.nan, np.nan]])).round(3)
+    array([3.536,   nan])
+    """
+    count = np.isfinite(squares).sum(axis=1)
+    return np.sqrt(np.nansum(squares, axis=1) / np.where(count, count, np.nan))
 
 
 def moved(poses: RigidTransform, points: Array) -> Array:

@@ -10,7 +10,6 @@ import cv2
 import numpy as np
 
 from camviz.cameras import Camera
-from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.board_warp import check_board_warp, with_board_warp
@@ -315,7 +314,7 @@ def _calibration(
         cam_from_board={
             name: camera.cam_from_world * adjustment.first_from_board for name, camera in adjustment.cameras.items()
         },
-        per_view_errors={name: _per_view_errors(adjustment, name) for name in adjustment.cameras},
+        per_view_errors={name: adjustment.view_rms(name) for name in adjustment.cameras},
         notes=(*sentences(adjustment, pictures), *([STOPPED_SHORT] if stopped else [])),
         pictures=pictures,
         set_aside=adjustment.set_aside,
@@ -326,14 +325,6 @@ def _calibration(
         board_warp=adjustment.warp,
         board_warp_covariance=adjustment.warp_covariance,
     )
-
-
-def _per_view_errors(adjustment: Adjustment, name: str) -> Array:
-    """RMS (views,) in pixels over the corners in use, and over all of a view that was set aside."""
-    squared = np.sum(adjustment.residuals[name] ** 2, axis=-1)
-    used = adjustment.used[name]
-    counted = np.where(used.any(axis=1, keepdims=True), used, np.isfinite(squared))
-    return np.sqrt(np.sum(squared, axis=1, where=counted) / counted.sum(axis=1))
 
 
 def _first_line(error: Exception) -> str:

@@ -54,7 +54,7 @@ class Stamp:
         times = _each(tags, _time)
         return cls(
             cameras=_each(tags, _camera),
-            lenses=_each(tags, lambda each: _word(each.get(LENS_MODEL))),
+            lenses=_each(tags, lambda each: word(each.get(LENS_MODEL))),
             focal_lengths=_each(tags, lambda each: _number(each.get(FOCAL_LENGTH), 1e-3, 1e5)),
             focus_distances=_each(tags, _focus),
             digital_zooms=_each(tags, lambda each: _number(each.get(DIGITAL_ZOOM), 1e-3, 1e3)),
@@ -93,7 +93,7 @@ def _each(tags: Sequence[Mapping[int, Any]], read: Callable[[Mapping[int, Any]],
 
 def _camera(tags: Mapping[int, Any]) -> str | None:
     """Make and model, the make once, and the number of the body: two bodies of one model are two cameras."""
-    make, model, serial = (_word(tags.get(tag)) or "" for tag in (MAKE, MODEL, SERIAL))
+    make, model, serial = (word(tags.get(tag)) or "" for tag in (MAKE, MODEL, SERIAL))
     named = model if model.lower().startswith(make.lower()) else f"{make} {model}".strip()
     return f"{named}, no. {serial}" if named and serial else named or None
 
@@ -101,7 +101,7 @@ def _camera(tags: Mapping[int, Any]) -> str | None:
 def _time(tags: Mapping[int, Any]) -> str | None:
     """ "2026:01:31 12:00:00" as "2026-01-31 12:00"."""
     try:
-        return f"{datetime.strptime(_word(tags.get(TAKEN)) or '', '%Y:%m:%d %H:%M:%S'):%Y-%m-%d %H:%M}"
+        return f"{datetime.strptime(word(tags.get(TAKEN)) or '', '%Y:%m:%d %H:%M:%S'):%Y-%m-%d %H:%M}"
     except ValueError:
         return None
 
@@ -112,7 +112,7 @@ def _focus(tags: Mapping[int, Any]) -> float | None:
     return None if distance is None else min(distance, FAR)
 
 
-def _word(value: Any) -> str | None:
+def word(value: Any) -> str | None:
     """What can be printed of a word; None where nothing is left."""
     words = "".join(c if c.isprintable() else " " for c in value) if isinstance(value, str) else ""
     return " ".join(words.split())[:LONGEST] or None

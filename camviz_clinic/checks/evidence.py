@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, TypeVar, cast
+from typing import Any, Self, TypeVar, cast
 
 import numpy as np
 
 from camviz.cameras import Camera
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.cross_validation import HeldOut, held_out
 from camviz_clinic.calibration.identifiability import Undecided, undecided
 from camviz_clinic.calibration.stamp import Stamp
 from camviz_clinic.calibration.types import Board, Calibration
@@ -63,6 +64,16 @@ class Evidence:
         if key not in self._made:
             self._made[key] = make()
         return cast(Made, self._made[key])
+
+    def knowing(self, other: Evidence) -> Self:
+        """This evidence, with what was made of other evidence about the same calibration."""
+        if other.calibration is self.calibration:
+            self._made.update(other._made)
+        return self
+
+    def held_out(self, name: str) -> HeldOut:
+        """A camera's corners held out of their view's pose, at the file's numbers."""
+        return self.once(("held out", name), lambda: held_out(self.adjustment(name), camera=name))
 
     def counterparts(self) -> Iterator[tuple[str, Camera, Camera]]:
         """As `matched`, without cameras that share their pixels and lens with one before."""

@@ -42,6 +42,7 @@ class Inspection:
         at: A distance in metres at which errors are told.
         ignored: What was found and is left out of `findings`.
         made: What the checks made, before causes are told.
+        evidence: What they were asked of.
 
     >>> from pathlib import Path
     >>> from camviz_clinic.calibration import Calibration
@@ -61,6 +62,7 @@ class Inspection:
     at: float | None = None
     ignored: tuple[Finding, ...] = ()
     made: tuple[Finding, ...] = field(default=(), repr=False)
+    evidence: Evidence | None = field(default=None, repr=False)
 
     @classmethod
     def of(cls, evidence: Evidence) -> Self:
@@ -90,6 +92,7 @@ class Inspection:
             differences=tuple(differences(evidence)),
             at=evidence.at,
             made=tuple(findings),
+            evidence=evidence,
         )
 
     def ignoring(self, ids: Collection[str]) -> Self:

@@ -14,6 +14,7 @@ from camviz.cameras import Camera, transform
 from camviz.lenses.base import Array
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.jacobian import pixel_jacobian
+from camviz_clinic.calibration.problem import rms_by_view
 
 Mask = NDArray[np.bool_]
 
@@ -57,9 +58,7 @@ class Observed:
     @cached_property
     def errors(self) -> Array:
         """The RMS (views,) of each view's residuals in pixels over the corners in use; NaN for a view without any."""
-        squares = np.sum(np.square(self.in_use), axis=-1)
-        counts = np.isfinite(squares).sum(axis=1)
-        return np.sqrt(np.where(counts > 0, np.nansum(squares, axis=1) / np.maximum(counts, 1), np.nan))
+        return rms_by_view(np.sum(np.square(self.in_use), axis=-1))
 
     @cached_property
     def scatter(self) -> float:

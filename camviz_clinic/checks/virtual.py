@@ -107,6 +107,12 @@ def single(rng: np.random.Generator, *, views: int | None = None, tilt_deg: tupl
     return SetUp((camera,), board, poses, float(rng.uniform(0.05, 0.3)))
 
 
+def single_in_the_middle(rng: np.random.Generator, window: float) -> SetUp:
+    """Such a camera, whose 15 boards stay inside this part of the image's sides."""
+    set_up = single(rng)
+    return replace(set_up, cam_from_board=spread_boards(rng, set_up.cameras, set_up.board, 15, (15, 40), window))
+
+
 def pair(rng: np.random.Generator, *, views: int | None = None) -> SetUp:
     """Two such cameras side by side, 5 to 12 cm apart, that both see every board."""
     view = rng.uniform(*VIEWS_DEG)

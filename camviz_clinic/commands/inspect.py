@@ -155,33 +155,17 @@ def _inspected(
 
     images = pictures(options.images) if options.images else []
     baseline = None if options.baseline_mm is None else options.baseline_mm / 1000
+    known: dict[str, Any] = {"compare": compare, "board": board, "at": options.at, "baseline": baseline}
+    known["pictures"] = _sizes(images)
     if PICTURES.fullmatch(paths[0].suffix):
         calibrated = _calibrated(paths, board, options.seconds)
         if isinstance(calibrated, Inspection):
             return calibrated
-        return inspect(
-            calibrated,
-            compare=compare,
-            pictures=_sizes(images),
-            board=board,
-            at=options.at,
-            baseline=baseline,
-            photographs=paths,
-        )
+        return inspect(calibrated, photographs=paths, **known)
     add = _adding(images, board, options)
     with on_disk(paths[0]) as file:
         try:
-            return inspect_file(
-                file,
-                size=options.size,
-                compare=compare,
-                pictures=_sizes(images),
-                board=board,
-                at=options.at,
-                baseline=baseline,
-                photographs=images,
-                prepare=add,
-            )
+            return inspect_file(file, size=options.size, photographs=images, prepare=add, **known)
         except CalibrationError as error:
             raise Refusal(str(error)) from error
 

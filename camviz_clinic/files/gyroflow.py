@@ -9,15 +9,14 @@ from typing import Any
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady, KannalaBrandt, Perspective, UnifiedSphere
 from camviz_clinic.calibration.line_delay import LineDelay
-from camviz_clinic.calibration.stamp import LONGEST, Stamp
+from camviz_clinic.calibration.stamp import Stamp, word
 from camviz_clinic.calibration.types import Calibration, CalibrationError
-from camviz_clinic.files.format import File, Format, listed
+from camviz_clinic.files.format import GRID, File, Format, listed
 from camviz_clinic.files.models import Model, expressed
 from camviz_clinic.files.output import as_json
 from camviz_clinic.files.section import Section, Size, agreed_size
 
 TITLE = "Gyroflow lens profile"
-GRID = "fx fy cx cy"
 FISHEYE = Model("opencv_fisheye", KannalaBrandt, f"{GRID} k1 k2 k3 k4")
 STANDARD = Model("opencv_standard", BrownConrady, f"{GRID} k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4")
 PINHOLE = Model("opencv_fisheye", Perspective, GRID)  # of which four zeros are one
@@ -208,9 +207,7 @@ def _positive(profile: Section, key: str, most: float) -> float:
 
 
 def _word(profile: Section, key: str) -> str:
-    value = profile.values.get(key)
-    words = "".join(c if c.isprintable() else " " for c in value) if isinstance(value, str) else ""
-    return " ".join(words.split())[:LONGEST]
+    return word(profile.values.get(key)) or ""
 
 
 def write(calibration: Calibration) -> bytes:

@@ -12,14 +12,13 @@ from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.types import Board, Calibration, Mask
-from camviz_clinic.files.format import File, Format
+from camviz_clinic.files.format import GRID, File, Format
 from camviz_clinic.files.models import Model, expressed
 from camviz_clinic.files.output import as_json, as_matrix
 from camviz_clinic.files.section import Section, agreed_size, explained
 from camviz_clinic.files.trees import MAX_NODES, shown
 
 TITLE = "PhotonVision calibration"
-GRID = "fx fy cx cy"
 TERMS = "k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4"
 MODELS = [Model("LENSMODEL_OPENCV", BrownConrady, f"{GRID} {' '.join(TERMS.split()[:count])}") for count in (5, 8, 12)]
 FIRST_KEY = "cameraExtrinsics"  # of the coefficients, until 2023

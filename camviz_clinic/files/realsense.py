@@ -7,13 +7,12 @@ from collections.abc import Iterator
 from camviz.cameras import Camera
 from camviz.lenses import BrownConrady, FieldOfView, KannalaBrandt, ModifiedBrownConrady, Perspective
 from camviz_clinic.calibration.types import Calibration
-from camviz_clinic.files.format import File, Format
+from camviz_clinic.files.format import GRID, File, Format
 from camviz_clinic.files.models import Model
 from camviz_clinic.files.section import Section, Size, agreed_size
 from camviz_clinic.files.trees import shown
 
 TITLE = "RealSense intrinsics"
-GRID = "fx fy cx cy"
 TERMS = "k1 k2 p1 p2 k3"
 MODELS = {  # by librealsense's name and its number
     "none": Model("none", Perspective, GRID),

@@ -55,7 +55,7 @@ def report(inspection: Inspection, *, images: Folders | None = None) -> str:
         name = inspection.source.name if inspection.source else "A calibration"
         return document(f"{name}: it could not be read", body, layout=layout, script=script)
     folders = images if images is None or isinstance(images, Mapping) else Path(images)
-    case = Case(inspection.calibration, inspection.compare, images=folders)
+    case = Case.of(inspection, folders)
     sections: list[tuple[Entry, str]] = []
     missing: dict[str, str] = {}
     for entry in VIEWS.values():

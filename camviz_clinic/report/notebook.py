@@ -76,7 +76,7 @@ class LiveInspection:
         if inspection.calibration is None:
             return
         folder = None if images is None else Path(images)
-        self.case = Case(inspection.calibration, inspection.compare, images=folder, largest=_LARGEST)
+        self.case = Case.of(inspection, folder, _LARGEST)
         wide, narrow = Layout(width="min(28em, 55vw)"), Layout(width="min(300px, 55vw)")  # of a telephone
         self._view = Dropdown(options=self._options(), value=self._first(), description=LOOK, layout=wide)
         camera = self._camera_of(self._view.value)

@@ -16,6 +16,7 @@ from camviz.views.base import View
 from camviz.views.distortion import DistortionView
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.checks.evidence import Evidence
+from camviz_clinic.checks.inspection import Inspection
 from camviz_clinic.views.board_poses import BoardPosesView
 from camviz_clinic.views.board_residuals import BoardResidualsView, tested
 from camviz_clinic.views.correlation import CorrelationView
@@ -51,6 +52,15 @@ class Case(Evidence):
 
     images: Path | Mapping[str, Path] | None = None
     largest: int = LARGEST
+
+    @classmethod
+    def of(
+        cls, inspection: Inspection, images: Path | Mapping[str, Path] | None = None, largest: int = LARGEST
+    ) -> Case:
+        """The case of an inspection that has a calibration. What its checks have made is not made again."""
+        assert inspection.calibration is not None
+        case = cls(inspection.calibration, inspection.compare, images=images, largest=largest)
+        return case.knowing(inspection.evidence) if inspection.evidence else case
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -169,7 +179,8 @@ def _correlation(case: Case, name: str) -> View:
 
 
 def _cross_validation(case: Case, name: str) -> View:
-    return CrossValidationView.about(case.adjustment(name), name, case.calibration.pictures.get(name, ()))
+    pictures = case.calibration.pictures.get(name, ())
+    return CrossValidationView.about(case.adjustment(name), name, pictures, case.held_out)
 
 
 _ENTRIES = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -18,6 +19,7 @@ from camviz.views.base import Drawn, View, choice
 from camviz.views.view_bars import names_below
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.cross_validation import Halves, HeldOut, halves, held_out
+from camviz_clinic.calibration.problem import rms_by_view
 from camviz_clinic.views.observations import Missing, short_names
 from camviz_clinic.views.uncertainty import adjusted, determined
 
@@ -56,20 +58,28 @@ class CrossValidationView(View):
         return cls.about(adjusted(calibration, name), name, calibration.pictures.get(name, ()))
 
     @classmethod
-    def about(cls, adjustment: Adjustment, camera: str = "", pictures: tuple[str, ...] = ()) -> CrossValidationView:
-        """The view of an adjustment, of those halves that agree less. Raises Missing where there can be none."""
+    def about(
+        cls,
+        adjustment: Adjustment,
+        camera: str = "",
+        pictures: tuple[str, ...] = (),
+        held_of: Callable[[str], HeldOut] | None = None,
+    ) -> CrossValidationView:
+        """The view of an adjustment, of those halves that agree less. Raises Missing where there can be none.
+
+        `held_of` gives the corners of a camera that were held out, where they are known already.
+        """
         name = camera or next(iter(adjustment.cameras))
         determined(adjustment)
         try:
             parts = min(_PARTS, key=lambda parts: _halves(adjustment, name, parts).probability)
-            held = held_out(adjustment, camera=name)
+            held = held_of(name) if held_of else held_out(adjustment, camera=name)
         except (ValueError, np.linalg.LinAlgError) as error:
             raise Missing(f"There can be no cross-validation: {error}.") from error
         if not np.isfinite(held.variances).any():
             raise Missing("There can be no cross-validation: half a board of so few corners gives no pose.")
         squares = np.where(adjustment.used[name], np.sum(adjustment.residuals[name] ** 2, axis=-1), np.nan)
-        with np.errstate(invalid="ignore"):
-            fitted = np.sqrt(np.nansum(squares, axis=1) / np.maximum(np.isfinite(squares).sum(axis=1), 1))
+        fitted = np.nan_to_num(rms_by_view(squares))
         return cls(adjustment, held, tuple(fitted.tolist()), name, pictures, parts)
 
     @property

@@ -20,7 +20,7 @@ from camviz.views.marks import arrows
 from camviz_clinic.calibration.difference import Difference, difference
 from camviz_clinic.views.observations import Missing
 from camviz_clinic.views.residuals import nice
-from camviz_clinic.views.uncertainty import DISTANCES
+from camviz_clinic.views.uncertainty import DISTANCES, place_of
 
 LARGE_TURN_DEG, LARGE_SHIFT = 0.5, 0.02  # degrees, and metres per metre of distance
 _LAYOUT = rows((470, {"difference": 680, "numbers": 280}))
@@ -104,11 +104,10 @@ class DifferenceView(View):
     def description(self) -> str:
         n = self.numbers()
         moved = f" and moved by {1000 * n['shift_m']:.2g} mm" if self.distance != "infinity" else ""
-        where = "at infinity" if self.distance == "infinity" else f"{self.distance} away"
         return (
-            f"{self.names[0]} against {self.names[1]}, points {where}: typically {n['median']:.3g} px apart, at "
-            f"most {n['worst']:.3g} px, "
-            f"after the second camera was turned by {n['turn_deg']:.3g}°{moved} to agree best. {self.warning}"
+            f"{self.names[0]} against {self.names[1]}, points {place_of(self.distance)}: typically {n['median']:.3g} "
+            f"px apart, at most {n['worst']:.3g} px, after the second camera was turned by {n['turn_deg']:.3g}°{moved} "
+            f"to agree best. {self.warning}"
         ).strip()
 
     def figure(self, *, draft: bool = False) -> Picture:
@@ -121,8 +120,7 @@ class DifferenceView(View):
         colours, attached = heat(panel, "colours", length, shades)
         content = colours + self._arrows(panel) + contours(panel, length, shades, " px", strong=1.0)
         legend, bar_picture = bar(panel.x + panel.width + 14, 64, panel.height - 60, "bar", shades, "px")
-        where = "at infinity" if self.distance == "infinity" else f"{self.distance} away"
-        shown = panel.show(content, title=f"Points {where}", note=f"arrows × {self.scale:g}")
+        shown = panel.show(content, title=f"Points {place_of(self.distance)}", note=f"arrows × {self.scale:g}")
         parts = {"difference": shown + legend, "numbers": self._words(690)}
         return self.tiled(_LAYOUT, parts, attached | bar_picture)
 

@@ -19,6 +19,7 @@ from camviz.lenses.base import Array
 from camviz.views.base import Drawn, slider
 from camviz.views.marks import arrows, clipped, on_photograph
 from camviz.views.view_bars import LABEL, ViewChooser, bars_of, ceiling, figures_on, names_below
+from camviz_clinic.calibration.problem import rms_by_view
 from camviz_clinic.views.observations import Missing, Photographs, no_photographs, not_at_hand, short_names
 from camviz_clinic.views.residuals import nice
 
@@ -97,9 +98,7 @@ class SharedViews:
     @cached_property
     def rms(self) -> Array:
         """The RMS (views,) in pixels of these distances in both pictures; NaN for a view that the two do not share."""
-        squares = np.concatenate([d**2 for d in self.distances], axis=1)
-        count = np.isfinite(squares).sum(axis=1)
-        return np.sqrt(np.nansum(squares, axis=1) / np.where(count, count, np.nan))
+        return rms_by_view(np.concatenate([d**2 for d in self.distances], axis=1))
 
     @property
     def total_rms(self) -> float:

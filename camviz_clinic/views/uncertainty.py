@@ -99,11 +99,10 @@ class UncertaintyView(SolvedView):
 
     def description(self) -> str:
         n = self.numbers()
-        where = "at infinity" if self.distance == "infinity" else f"{self.distance} away"
         return (
-            f"{self.name}, points {where}: ±{n['middle']:.3g} px in the middle of the picture, ±{n['worst']:.3g} "
-            "px at worst; "
-            f"below 1 px over {100 * n['below_1']:.0f} % of it. The corners' noise is {n['sigma']:.3g} px. {LEFT_OUT}"
+            f"{self.name}, points {place_of(self.distance)}: ±{n['middle']:.3g} px in the middle of the picture, "
+            f"±{n['worst']:.3g} px at worst; below 1 px over {100 * n['below_1']:.0f} % of it. The corners' noise is "
+            f"{n['sigma']:.3g} px. {LEFT_OUT}"
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
@@ -114,8 +113,7 @@ class UncertaintyView(SolvedView):
         colours, attached = heat(panel, "colours", values, shades)
         content = colours + self._ellipses(panel) + contours(panel, values, shades, " px", strong=1.0)
         legend, bar_picture = bar(panel.x + panel.width + 14, 64, panel.height - 60, "bar", shades, "px")
-        where = "at infinity" if self.distance == "infinity" else f"{self.distance} away"
-        shown = panel.show(content, title=f"{self.name}: one standard deviation, points {where}")
+        shown = panel.show(content, title=f"{self.name}: one standard deviation, points {place_of(self.distance)}")
         parts = {"uncertainty": shown + legend, "numbers": self._words(690)}
         return self.tiled(_LAYOUT, parts, attached | bar_picture)
 
@@ -230,6 +228,11 @@ def _along(
     """The distances (n,), and the standard deviations (pixels, n) there."""
     deviations = [worst_deviation(projection_covariance(adjustment, pixels, d, name)) for d in distances]
     return np.array(distances), np.stack(deviations, axis=-1)
+
+
+def place_of(distance: str) -> str:
+    """Where points at one of DISTANCES lie, in words."""
+    return "at infinity" if distance == "infinity" else f"{distance} away"
 
 
 def adjusted(calibration: Any, *names: str) -> Adjustment:

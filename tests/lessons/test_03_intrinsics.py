@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from camviz.scenes.balloon import BALLOON, balloon_in_sight, towards_balloon
 from camviz.scenes.photographs import photograph
 from camviz.scenes.standard import textured_scene
+from camviz_school.views.balloon import BALLOON, balloon_in_sight, towards_balloon
 from camviz_school.views.camera_matrix import GLOBE, GLOBE_RADIUS
 from camviz_school.views.intrinsics import IntrinsicsView
 

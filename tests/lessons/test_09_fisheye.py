@@ -9,8 +9,8 @@ from scipy.optimize import brentq, least_squares
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import KannalaBrandt
 from camviz.scenes import board_corners, snapshot, textured_scene
-from camviz.scenes.walk import around_board
 from camviz_school.views.fisheye import FisheyeView
+from camviz_school.views.walk import around_board
 
 EXCEPTIONS: dict[str, str] = {}
 

@@ -280,7 +280,7 @@ def test_the_valley_of_boards_near_the_axis_and_the_pit_of_boards_far_out(says):
     setting = next(cell for cell in code.split("from scipy.spatial.transform import")[1:] if "def boards" in cell)
     exec(
         "from camviz.lenses import UnifiedSphere\nfrom scipy.spatial.transform import"
-        + setting.partition("from camviz_clinic.calibration.focal_xi_ambiguity")[0],
+        + setting.partition("from camviz_school.views.focal_xi_ambiguity")[0],
         namespace,
     )
     rng, corners = np.random.default_rng(4), namespace["board"].corners

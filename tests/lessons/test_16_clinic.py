@@ -8,8 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from camviz_clinic.calibration.difference import pixel_grid
-from camviz_clinic.checks.laboratory import GRID, lab_faults
 from camviz_school.views.fault_lab import FaultLabView
+from camviz_school.views.laboratory import GRID, lab_faults
 
 EXCEPTIONS: dict[str, str] = {
     "is the answer sheet for patient 3": "it names a patient, not a quantity",

@@ -12,8 +12,9 @@ import numpy as np
 from kernel import median_ms, table
 from scipy.spatial.transform import RigidTransform
 
-from camviz.scenes import aperture, parallax, textured_scene, to_display
-from camviz.scenes.aperture import ThinLensCamera
+from camviz.scenes import textured_scene, to_display
+from camviz_school.views import aperture, parallax
+from camviz_school.views.aperture import ThinLensCamera
 from camviz_school.views.depth_of_field import DRAFT, FINE, DepthOfFieldView
 
 POINTS = 64  # of the lens

@@ -14,11 +14,11 @@ from camviz.cameras import Camera
 from camviz.distortion import fold_angle
 from camviz.lenses.base import Array
 from camviz_clinic.calibration.adjustment import Adjustment
-from camviz_clinic.calibration.cross_validation import held_out
+from camviz_clinic.calibration.cross_validation import HeldOut, held_out
 from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.observed import Observed
 from camviz_clinic.checks.registry import VIEW_BY_VIEW, Finding, LabFault, Rng, finding
-from camviz_clinic.checks.virtual import single, spread_boards
+from camviz_clinic.checks.virtual import single, single_in_the_middle
 
 COVERED = 0.4  # of the image: the outermost corners are a square inside the board
 CELLS = 64  # along the longer side of the image, to measure areas
@@ -97,9 +97,7 @@ def within_reach(camera: Camera, rows: int, columns: int) -> NDArray[np.bool_]:
 )
 def boards_in_the_middle(rng: Rng, strength: float) -> Evidence:
     """The boards stay inside this part of the sides."""
-    set_up = single(rng)
-    poses = spread_boards(rng, set_up.cameras, set_up.board, 15, (15, 40), strength)
-    set_up = replace(set_up, cam_from_board=poses)
+    set_up = single_in_the_middle(rng, strength)
     return Evidence(set_up.solved(set_up.observed(rng)))
 
 
@@ -189,7 +187,7 @@ def all_parallel(rng: Rng, strength: float) -> Evidence:
 def pose_absorbs_error(evidence: Evidence) -> Iterator[Finding]:
     """The check fits each view's pose to one half of its corners and tries it on the other half."""
     for name, observed in evidence.with_corners().items():
-        ratio = held_out_ratio(observed)
+        ratio = held_out_ratio(evidence, observed)
         if ratio > HELD_OUT:
             sentence = (
                 f"{name}: where each pose is fitted to one half of the board, the other half is {ratio:.1f} times as "
@@ -198,18 +196,25 @@ def pose_absorbs_error(evidence: Evidence) -> Iterator[Finding]:
             yield pose_absorbs_error.found(sentence, ratio, "times", name)
 
 
-def held_out_ratio(observed: Observed) -> float:
+def held_out_ratio(evidence: Evidence, observed: Observed) -> float:
     """How many times larger the errors of held-out corners are than noise makes them, in the median of the views.
 
     Each corner's squared error is divided by its variance; `camviz_clinic.calibration.cross_validation` explains both.
     """
-    aside = replace(observed.adjustment, set_aside=observed.best.set_aside)
-    result = held_out(aside, camera=observed.name)
+    result = _held_out(evidence, observed)
     squares = np.moveaxis(result.residuals**2 / result.variances, 1, 0).reshape(observed.adjustment.views, -1)
     known = np.isfinite(squares).any(axis=1)
     if known.sum() < FEWEST_VIEWS:
         return 0.0
     return float(np.sqrt(np.median(np.nanmean(squares[known], axis=1))))
+
+
+def _held_out(evidence: Evidence, observed: Observed) -> HeldOut:
+    """Without the corners that are far out; as the report shows it where there is none."""
+    aside = observed.best.set_aside
+    if aside is observed.adjustment.set_aside and observed.name in evidence.calibration.cam_from_board:
+        return evidence.held_out(observed.name)
+    return held_out(replace(observed.adjustment, set_aside=aside), camera=observed.name)
 
 
 @pose_absorbs_error.fault(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,7 @@ from camviz_clinic.checks.judgement import listed
 from camviz_clinic.checks.observed import Observed
 from camviz_clinic.checks.refit import far_columns
 from camviz_clinic.checks.registry import Finding, Rng, finding
-from camviz_clinic.checks.virtual import single, spread_boards
+from camviz_clinic.checks.virtual import single, single_in_the_middle
 
 MOST_STEPS = 30  # of a solver, along a valley without an end
 MOST_NAMED = 8  # parameters with the amount of their change
@@ -108,9 +107,7 @@ def parallel_to_the_sensor(rng: Rng, strength: float) -> Evidence:
 @unidentifiable.fault("terms without corners", "of a side", (0.1, 0.15, 0.25), promised=0.15)
 def terms_without_corners(rng: Rng, strength: float) -> Evidence:
     """The boards stay inside this part of the sides, where r⁵ and r⁷ are next to nothing."""
-    set_up = single(rng)
-    poses = spread_boards(rng, set_up.cameras, set_up.board, 15, (15, 40), strength)
-    set_up = replace(set_up, cam_from_board=poses)
+    set_up = single_in_the_middle(rng, strength)
     return Evidence(set_up.solved(set_up.observed(rng)))
 
 

@@ -163,11 +163,6 @@ def _of_means(difference: NDArray[np.float64], total: NDArray[np.float64]) -> tu
     return in_time, float(total.var(ddof=1)) / 4 - in_time / 2
 
 
-def frame_variance(frame: ArrayLike) -> float:
-    """The variance (DN²) over the pixels of one frame: noise *and* pattern, which one frame cannot tell apart."""
-    return float(np.var(np.asarray(frame, dtype=float), ddof=1))
-
-
 @dataclass(frozen=True)
 class Part:
     """A variance (DN²) of a pattern or of one of its parts, and its standard error; below zero by chance alone."""

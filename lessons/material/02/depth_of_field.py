@@ -20,11 +20,11 @@ from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import axes, band, curve, legend, logarithmic, logarithmic_grid, logs, plot_panel, upright
 from camviz.draw.readout import listed, readout
 from camviz.poses import RigidTransform
-from camviz.scenes import parallax, to_display
-from camviz.scenes.aperture import Aperture, ThinLensCamera
+from camviz.scenes import to_display
 from camviz.views.base import View, choice, positive, slider, step_of, switch, without
 from camviz.views.yours import is_unwritten, tried
-from camviz_school.views import lens_diagram
+from camviz_school.views import lens_diagram, parallax
+from camviz_school.views.aperture import Aperture, ThinLensCamera
 from camviz_school.views.blur_levels import BLURS, DEPTHS, levels, micrometres
 from camviz_school.views.garland import DUSK, GLOBE_M, GLOBE_Z, STAND, garden_at_dusk, garden_with_lamps
 from camviz_school.views.lens_tiles import NARROW, PANELS, TILES, lens_tiles

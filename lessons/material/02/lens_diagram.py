@@ -14,8 +14,8 @@ from camviz import optics
 from camviz.draw import svg
 from camviz.draw.panel import Panel
 from camviz.lenses.base import Array
-from camviz.scenes.aperture import Aperture, ThinLensCamera
 from camviz.views.marks import circle
+from camviz_school.views.aperture import Aperture, ThinLensCamera
 
 HORIZON_MM = 180.0  # k: where infinity is drawn, before the lens
 BEHIND_MM = 125.0  # as much as is drawn behind it

@@ -11,8 +11,8 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses.base import Array, unit
 from camviz.poses import RigidTransform
-from camviz.scenes.balloon import balloon_in_sight
 from camviz.views.base import Control, OrbitView, choice, slider, switch
+from camviz_school.views.balloon import balloon_in_sight
 
 GLOBE, GLOBE_RADIUS = np.array([0.68, 0.36, 3.3]), 0.27  # in the world; the camera stands before it on the z axis
 BINS = 4

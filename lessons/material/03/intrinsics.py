@@ -24,9 +24,9 @@ from camviz.draw.space import Item, Label, Line, OrbitCamera, camera_body, draw_
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz.scenes import render, textured_scene, to_display
-from camviz.scenes.balloon import BALLOON, balloon_rim, balloon_scene, towards_balloon
 from camviz.views.base import Drawn, without
 from camviz.views.yours import is_unwritten, tried
+from camviz_school.views.balloon import BALLOON, balloon_rim, balloon_scene, towards_balloon
 from camviz_school.views.camera_matrix import GLOBE, GLOBE_RADIUS, CameraMatrix, added
 
 _LEAN_DRAWN = 3  # times

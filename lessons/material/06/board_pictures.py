@@ -19,7 +19,7 @@ from camviz.views.base import View, choice, slider, switch
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.jacobian import parameter
 from camviz_clinic.calibration.types import Board
-from camviz_clinic.calibration.zhang import board_pose, camera_matrix, focal_lengths, homography
+from camviz_school.views.zhang import board_pose, camera_matrix, focal_lengths, homography
 
 BOARD = Board(9, 6, 0.025)
 TRUTH = Camera(Intrinsics(640, 480, 545.0, 543.0, 331.0, 233.0), BrownConrady(k1=-0.24, k2=0.01, p1=0.0004, p2=-0.0003))

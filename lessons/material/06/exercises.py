@@ -367,7 +367,7 @@ CONSTRAINTS = Exercise(
 
 @CONSTRAINTS.right
 def as_camviz_has_them(H):
-    from camviz_clinic.calibration.zhang import constraints as of_the_closed_form
+    from camviz_school.views.zhang import constraints as of_the_closed_form
 
     return of_the_closed_form(H)
 
@@ -522,7 +522,7 @@ POSE = Exercise(
 
 @POSE.right
 def as_camviz_has_it(H, K):
-    from camviz_clinic.calibration.zhang import board_pose as of_the_closed_form
+    from camviz_school.views.zhang import board_pose as of_the_closed_form
 
     pose = of_the_closed_form(H, K)
     return pose.rotation.as_matrix(), pose.translation

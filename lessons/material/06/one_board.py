@@ -16,7 +16,7 @@ from camviz.lenses.base import Array
 from camviz.views.patience import Patience
 from camviz.views.yours import YOURS_HERE, is_unwritten, tried
 from camviz_clinic.calibration.types import Board
-from camviz_clinic.calibration.zhang import focal_lengths, homography
+from camviz_school.views.zhang import focal_lengths, homography
 
 Function = Callable[..., Any]
 

@@ -21,8 +21,8 @@ from camviz.views.base import choice, slider, switch
 from camviz.views.marks import arrows, shortened
 from camviz.views.view_bars import LABEL, ViewChooser
 from camviz.views.yours import tried
-from camviz_clinic.checks.laboratory import BOARD, VIEWS, Experiment, experiment, lab_faults
 from camviz_clinic.checks.registry import Finding
+from camviz_school.views.laboratory import BOARD, VIEWS, Experiment, experiment, lab_faults
 
 _COLOURS = {"fault": "red", "warning": "orange", "note": "muted"}
 _MOST = 3  # findings that have room

@@ -19,11 +19,11 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
-from camviz.scenes.aperture import ThinLensCamera
 from camviz.scenes.rays import Floats
 from camviz.scenes.scene import Scene
 from camviz.scenes.surfaces import Surface
 from camviz.scenes.texture import Texture
+from camviz_school.views.aperture import ThinLensCamera
 
 _STEP = 16  # pixels by which the margin around the picture grows, so that layers are seldom traced afresh
 _NEAR = 1.0  # metres: what is nearer still may be cut off at the picture's border when it is very blurred

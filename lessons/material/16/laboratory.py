@@ -20,7 +20,6 @@ from camviz.lenses.base import Array
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.difference import Difference, difference, pixel_grid
 from camviz_clinic.calibration.jacobian import with_parameters
-from camviz_clinic.calibration.residual_statistics import view_rms
 from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.calibration.uncertainty import mean_deviation, projection_covariance
 from camviz_clinic.checks.findings import faults
@@ -79,7 +78,7 @@ class Experiment:
     @cached_property
     def errors(self) -> Array:
         """The RMS (views,) of every view."""
-        return view_rms(self.residuals)
+        return self.solved.view_rms("camera")
 
     @cached_property
     def believed(self) -> Array:

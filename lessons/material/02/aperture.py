@@ -160,8 +160,8 @@ class ThinLensCamera:
 def photograph(scene: Scene, camera: ThinLensCamera, samples: int = 64) -> Floats:
     """The picture (height, width, 3), linear light: the mean over `samples` points of the lens of what each sees.
 
-    Every ray is traced, which takes as long as `samples` pictures; `camviz.scenes.parallax` is the fast way. Rays that
-    the aperture stops bring no light: half a lens makes a picture half as bright.
+    Every ray is traced, which takes as long as `samples` pictures; `camviz_school.views.parallax` is the fast way. Rays
+    that the aperture stops bring no light: half a lens makes a picture half as bright.
     """
     light = np.zeros((camera.height, camera.width, 3), dtype=np.float32)
     for point, passes in zip(*camera.points(samples), strict=True):
