@@ -95,7 +95,7 @@ def pictured(rows):
 
 DONE = re.compile(  # "Pull the slider, and it turns grey": an order, and what comes of it
     r"(?:^|[.:] )(?:Bring|Choose|Click|Drag|Move|Press|Pull|Set|Switch|Take|Turn)\b[^.?]*(?:: |, and\b)[^.?]*(?:\.|$)"
-    r"|\b(?:[Aa]s soon as|[Oo]nce you|[Aa]fter you|[Ww]hen you|(?<!, )when the \w+ (?:turns?|moves?))\b[^.?]*(?:[.,]|$)"
+    r"|\b(?:(?i:as soon as|once you|after you|when you)|(?<!, )when the \w+ (?:turns?|moves?))\b[^.?]*(?:[.,]|$)"
 )
 
 
