@@ -93,6 +93,34 @@ def pictured(rows):
     return len(rows[0]) == 1 and re.search(r"right|in front|left", rows[0][0].description)
 
 
+DONE = re.compile(  # "Pull the slider, and it turns grey": an order, and what comes of it
+    r"(?:^|[.:] )(?:Bring|Choose|Click|Drag|Move|Press|Pull|Set|Switch|Take|Turn)\b[^.?]*(?:: |, and\b)[^.?]*(?:\.|$)"
+    r"|\b(?:(?i:as soon as|once you|after you|when you)|(?<!, )when the \w+ (?:turns?|moves?))\b[^.?]*(?:[.,]|$)"
+)
+
+
+@EACH
+def test_a_heading_does_not_tell_what_only_comes_after_a_movement(path):
+    """It may ask for it: what stands on a slide is the picture before anything was moved."""
+    headings = [unescape(re.sub(r"<[^>]*>", "", one.heading)) for one in made(path) if one.kind == "picture"]
+    assert [one for one in headings if DONE.search(one)] == []
+
+
+@pytest.mark.parametrize(
+    ("heading", "found"),
+    [
+        ("Rings are coloured. Pull the slider, and they turn grey", True),
+        ("Turn both cameras: every yellow line becomes a row", True),
+        ("The dots move when the camera turns, and they stay", True),
+        ("Turn both cameras until every yellow line is a row", False),
+        ("Drag the focal length: what becomes of globe and bush?", False),
+        ("Will the dots stay on it when the camera turns?", False),
+    ],
+)
+def test_such_a_heading_would_be_found(heading, found):
+    assert bool(DONE.search(heading)) is found
+
+
 @EACH
 def test_a_text_that_points_below_says_on_which_slide_that_is(path):
     found = made(path)
@@ -221,6 +249,8 @@ CHECKED = ('check("00.f", f)', "check")
         ("def g(x):\n    return f(x)\n\ndraw(g)", True),
         ("[f for f in range(3)]", False),
         ("for f in range(3):\n    draw(f)", False),
+        ("for i in range(3):\n    f = 3\n    draw(f)", False),
+        ("for i in f(3):\n    draw(i)", True),
         ("f = 3\ndraw(f)", False),
         ("y = f(2)", True),
     ],

@@ -13,7 +13,7 @@ FORMULA = re.compile(r"(?P<code>```.*?```|`[^`\n]*`)|\$\$(?P<display>.+?)\$\$|\$
 _HELD = re.compile("\ue000(\\d+)\ue001")
 _LINK = re.compile(r"!?\[([^\]]*)\]\([^)]*\)")
 _FOLDED = re.compile(r"<details>.*?</details>", re.DOTALL)
-_SENTENCE = re.compile(r"(?<=[.!?])[*”\"')]*\s+(?=[*“\"'(`$\[]*[A-Z0-9])")
+_SENTENCE = re.compile(r"(?<=[.!?])[*”\"')]*\s+(?=[*“\"'(`$\[]*[A-Z0-9μ])")
 
 
 def formula(latex: str, display: bool = False) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from collections.abc import Iterator
 from typing import Any
 
 from camviz_school.course import notebooks, questions
@@ -46,7 +47,7 @@ def drawn_by_reader(notebook: Notebook, *, given: bool = False) -> dict[str, str
         tree = ast.parse(cell.source)
         stub = "stub" in cell.metadata.get("tags", [])
         exercise = notebooks.exercise_of(cell).partition(".")[2] if stub and (given or is_open(cell)) else ""
-        for statement in tree.body:
+        for statement in _in_order(tree.body):
             used = [written[name] for name in written if name in _loaded(statement)]
             if used and not stub:
                 found[cell.id] = used[-1]
@@ -55,6 +56,16 @@ def drawn_by_reader(notebook: Notebook, *, given: bool = False) -> dict[str, str
                 if exercise or (used and not stub):
                     written[name] = exercise or used[-1]
     return found
+
+
+def _in_order(body: list[ast.stmt]) -> Iterator[ast.stmt]:
+    """Statements one by one, those of a loop too: what its body gives a name is not what the name had before it."""
+    for statement in body:
+        if isinstance(statement, ast.For):
+            yield ast.Assign([statement.target], statement.iter)
+            yield from _in_order([*statement.body, *statement.orelse])
+        else:
+            yield statement
 
 
 def is_open(stub: Cell) -> bool:

@@ -19,7 +19,7 @@ from camviz_school.teaching import markup, panels, parts
 from camviz_school.teaching.panels import SavedImage
 from camviz_school.teaching.plans import Notice
 
-MOST_WORDS, HEADING_WORDS, LEAST_WORDS = 40, 18, 5
+MOST_WORDS, TASK_WORDS, HEADING_WORDS, LEAST_WORDS = 40, 55, 18, 5
 RECAP_WORDS, RECAP_ROWS = 55, 3
 GIVEN_LINES, CODE_LETTERS = 8, 62
 """Of a function that is given and wrong, each line so many letters: a longer one is shown by its first line."""
@@ -37,9 +37,22 @@ _ITEM = re.compile(r"^\* (.+?)(?=^\* |\n\s*\n|\Z)", re.MULTILINE | re.DOTALL)
 _MISCONCEPTION = re.compile(r"\A> \*\*Misconception: (?P<thought>.+?)\*\*\s*(?P<answer>.*)\Z", re.DOTALL)
 _CLAIM = re.compile(r"\*\*([^*]+ [^*]+ [^*]+?)\*\*")  # three words or more: one or two are the name of a control
 _EQUATION = re.compile(r"\$\$(.+?)\$\$", re.DOTALL)
+# What is to be done with the lesson's picture; a slide has no buttons.
+_BY_HAND = re.compile(
+    r"^\W*(?:Then |Try it: )?(?:bring|change|choose|click|move|open|press|pull|put (?:it|the)|set|step|switch|take)\b"
+    r"|\*\*\+ |\byou choose\b",
+    re.IGNORECASE,
+)
+_ASKS = re.compile(
+    r"\?|(?:^|[,:;] |\b(?:and|then|now) )(?:answer|build|compute|correct|do|estimate|find|give|invert|lay|let|make"
+    r"|measure|mend|move|put|return|say|solve|take|use|work out|write)\b",
+    re.IGNORECASE,
+)
 _QUIET = {"Recap", "Further reading", "Glossary"}
 # What the lesson shows below a text is on a later slide; "below a pixel" is a comparison, and points nowhere.
-_BELOW = re.compile(r"\b[Bb]elow\b(?!,? (?:an?|the|that|one|zero|it)\b|,? \d)|\b[Bb]elow it (?:a|first)\b|lower row")
+_BELOW = re.compile(
+    r"\b[Bb]elow\b(?!,? (?:an?|the|that|one|zero|it|by)\b|,? \d)|\b[Bb]elow (?:it (?:a|first)|the code)\b|lower row"
+)
 _BELOW_STUB = re.compile(r"\bbelow it\b")
 
 
@@ -64,6 +77,7 @@ class _Place:
     part: str = ""
     heading: str = ""
     said: str = ""
+    task: list[str] = field(default_factory=list)
     notice: list[Notice] = field(default_factory=list)
     withheld: Collection[str] = ()
     exercises: dict[str, str] = field(default_factory=dict)
@@ -202,12 +216,25 @@ def _as_heading(sentence: str) -> str:
 
 
 def _exercise(cell: Cell, place: _Place) -> Slide:
-    task = markup.opening(place.said, MOST_WORDS)
     lines = cell.source[cell.source.find("def ") :].splitlines()
     given = not parts.is_open(cell) and sum(-(-len(line) // CODE_LETTERS) for line in lines) <= GIVEN_LINES
     code = "\n".join(lines if given else lines[:1])
+    task = _asked_for(place.task, MOST_WORDS if given else TASK_WORDS)
     body = f"{f'<p>{markup.inline(task)}</p>' if task else ''}<pre>{escape(code)}</pre>"
     return Slide("exercise", place.part, markup.inline(place.heading), body)
+
+
+def _asked_for(task: Sequence[str], most: int) -> str:
+    """What an exercise asks for: how its last paragraph opens, or of the one that asks its first sentence and that."""
+    for paragraph in reversed(task):
+        opening = markup.opening(paragraph, most)
+        if any(map(_ASKS.search, markup.sentences(opening))):
+            return opening
+        first, *others = markup.sentences(paragraph)
+        for one in filter(_ASKS.search, others):
+            shortened = (f"{first} … {one}", one)
+            return next((text for text in shortened if markup.words(text) <= most), opening)
+    return markup.opening(task[-1], most) if task else ""
 
 
 # Questions -----------------------------------------------------------------------------------------------------------
@@ -235,7 +262,7 @@ def _question(question: Question, part: str) -> Iterator[Slide]:
 def _of_block(block: str, place: _Place) -> Iterator[Slide]:
     heading = re.match(r"(#+) (.+)", block)
     if heading:
-        place.heading, place.said = heading[2].strip(), ""
+        place.heading, place.said, place.task = heading[2].strip(), "", []
         if len(heading[1]) == 2:
             place.part, place.asked = place.heading, set()
         block = block[heading.end() :].strip()
@@ -246,7 +273,7 @@ def _of_block(block: str, place: _Place) -> Iterator[Slide]:
         return
     elif misconception:
         answer = re.sub(r"^> ?", "", misconception["answer"], flags=re.MULTILINE)
-        text = markup.opening(answer, MOST_WORDS)
+        text = re.sub(r":$", ".", markup.opening(answer, MOST_WORDS))
         yield Slide("misconception", place.part, markup.inline(misconception["thought"].rstrip(".")), _paragraph(text))
     else:
         for latex in _EQUATION.findall(block):
@@ -255,6 +282,7 @@ def _of_block(block: str, place: _Place) -> Iterator[Slide]:
         if not block.startswith(("|", ">", "*", "1.", "$$", "```")):
             yield from _claims(block, place.part)
             place.said = block
+            place.task.append(block)
 
 
 def _heading_of_equation(before: str, place: _Place) -> str:
@@ -296,7 +324,10 @@ def _height(line: str) -> int:
 
 
 def _halves(line: str) -> list[str]:
-    """A line that is too long for a slide, broken before the operator nearest its middle."""
+    """A line that is too long for a slide, broken where a gap parts it, else before the operator nearest its middle."""
+    several = [one for one in re.split(r"[,;]?\s*\\quad(?![a-z])", line) if one.strip()]
+    if _width(line) > LONGEST_LINE and len(several) > 1 and not any(map(_depth, several)):
+        return [half for one in several for half in _halves(one)]
     signs = [found.start() for found in re.finditer(r"(?<=\s)[+=−-](?=\s)|\\Longrightarrow", line)]
     breaks = [at for at in signs if not _depth(line[:at])]
     if _width(line) <= LONGEST_LINE or not breaks or "\\begin" in line:
@@ -313,7 +344,7 @@ def _depth(latex: str) -> int:
 
 def _claims(paragraph: str, part: str) -> Iterator[Slide]:
     for sentence in markup.sentences(_EQUATION.sub("", paragraph)):
-        if _CLAIM.search(sentence) and markup.words(sentence) <= MOST_WORDS:
+        if _CLAIM.search(sentence) and markup.words(sentence) <= MOST_WORDS and not _BY_HAND.search(sentence):
             yield Slide("claim", part, "", _paragraph(sentence))
 
 
