@@ -81,9 +81,7 @@ def two_sided(rng: np.random.Generator, cameras: int = 4, *, frames: int = 30) -
     upright = np.column_stack(
         [rng.normal(0, 0.3, frames), rng.uniform(-np.pi, np.pi, frames), rng.normal(0, 0.3, frames)]
     )
-    middle = RigidTransform.from_translation(-FRONT.corners.mean(axis=0))
-    swings = RigidTransform.from_components(rng.normal(0, 0.1, (frames, 3)), Rotation.from_rotvec(upright))
-    poses = first * (swings * middle)
+    poses = _carried(rng, first, FRONT, Rotation.from_rotvec(upright), 0.1)
     return VirtualBoards(by_name, {"front": FRONT, "back": BACK}, places, {"front": poses, "back": poses})
 
 
@@ -150,9 +148,16 @@ def parting(rng: np.random.Generator, cameras: int = 3, *, frames: int = 20) -> 
     for name, board in (("one", FRONT), ("other", BACK)):
         towards = Rotation.from_rotvec([0, -np.radians(25) * (cameras - 1) / 2, 0])
         turns = towards * Rotation.from_rotvec(rng.normal(0, 0.3, (frames, 3)))
-        middle = RigidTransform.from_translation(-board.corners.mean(axis=0))
-        poses[name] = first * (RigidTransform.from_components(rng.normal(0, 0.15, (frames, 3)), turns) * middle)
+        poses[name] = _carried(rng, first, board, turns, 0.15)
     return VirtualBoards(by_name, {"one": FRONT, "other": BACK}, dict.fromkeys(poses, RigidTransform.identity()), poses)
+
+
+def _carried(
+    rng: np.random.Generator, first: RigidTransform, board: Board, turns: Rotation, spread: float
+) -> RigidTransform:
+    """A board's poses turned about its middle, which strays by `spread` metres about the middle of the room `first`."""
+    middle = RigidTransform.from_translation(-board.corners.mean(axis=0))
+    return first * (RigidTransform.from_components(rng.normal(0, spread, (len(turns), 3)), turns) * middle)
 
 
 def misprinted(truth: VirtualBoards, board: str, factor: float) -> VirtualBoards:
