@@ -162,8 +162,9 @@ class Evidence:
             return calibration.undecided[name]
         if name not in self.observed:
             covariance, names = calibration.intrinsics_covariance.get(name), calibration.estimated.get(name, ())
-            known = covariance is not None and name not in calibration.detections
-            return undecided_by_covariance(calibration.cameras[name], names, covariance) if known else ()
+            if covariance is None or name in calibration.detections:
+                return ()
+            return undecided_by_covariance(calibration.cameras[name], names, covariance)
         observed = self.observed[name]
         return undecided(self._with_others(name) or observed.adjustment, name, observed.noise)
 

@@ -125,7 +125,7 @@ class TargetAdjustment(RigAdjustment):
     def jacobian(self, name: str) -> tuple[Array, Array]:
         """As `Linearisation.jacobian`, also by where the boards are and by their sizes."""
         by_shared, by_pose = super().jacobian(name)
-        part, views = self.parts[name], self.used[name].any(axis=1)[self.posed]
+        part, views = self.parts[name], np.any(self.used[name][self.posed], axis=1)
         extra = part.own >= len(self.parameters) - len(self.sized) - len(POSE) * len(self.free)
         changed = by_shared[views]
         changed[..., part.own[extra]] = part.by_own[..., extra].reshape(*changed.shape[:-1], int(extra.sum()))
