@@ -7,7 +7,12 @@ import pytest
 
 from camviz_clinic.calibration import CannotCalibrate
 from camviz_clinic.calibration.adjustment import twisted
-from camviz_clinic.commands.several import size_sentence
+from camviz_clinic.calibration.arrowhead import Arrowhead
+from camviz_clinic.checks import inspect
+from camviz_clinic.commands.board_notes import board_sentences, size_sentence
+from camviz_clinic.commands.several import BoardsFile, told_of
+from camviz_clinic.files import load
+from camviz_clinic.files.writing import write
 from camviz_clinic.rigs import calibrate_boards, relative_pose, virtual_boards
 
 SCENES = {
@@ -46,11 +51,14 @@ def errors(of, true):
 def test_cameras_and_boards_are_where_they_are_within_three_deviations(scene, thorough):
     off = []
     for seed in range(20 if thorough else 1):
-        truth, found = solved(scene, seed)
+        truth, found = solved(scene, seed, fixed=("k3",))  # boards in the middle of the picture do not decide k3
         off += [errors(*each) for each in beside(truth, found)]
         assert found.calibration.notes == ()
         assert abs(found.adjustment.sigma - truth.noise) < 0.01
-        assert not any(size_sentence(name, *size) for name, size in found.sizes.items())
+        assert board_sentences(found) == ()
+        assert not any(found.undecided.values())
+        said = told_of(found, BoardsFile(truth.boards, {}, found.groups, {}))
+        assert not [sentence for sentence in said if "not known" in sentence]
     off = np.concatenate(off)
     assert (np.abs(off) < 3).mean() >= 0.99
     assert np.sqrt(np.mean(off**2)) < 1.3
@@ -89,6 +97,27 @@ def test_a_board_that_was_printed_in_another_size_is_measured(factor):
     assert size_sentence("back", size, sigma)
 
 
+def seen_once(one):
+    return replace(one, pictures=one.pictures[:1], corners=one.corners[:1], places=one.places[:1])
+
+
+def blurred(one):
+    return replace(one, corners=one.corners + np.random.default_rng(1).normal(0, 1.0, one.corners.shape))
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "said"),
+    [(seen_once, "marker1: 1 frame shows it, and its place"), (blurred, "marker1: its corners scatter")],
+)
+def test_a_board_that_was_seen_once_or_fits_worse_is_named_and_no_other(spoilt, said):
+    rng = np.random.default_rng(2)
+    truth = virtual_boards.markers(rng, count=4, frames=16)
+    seen = truth.observed(rng)
+    seen["cam0"]["marker1"] = spoilt(seen["cam0"]["marker1"])
+    (sentence,) = board_sentences(calibrate_boards(seen, truth.boards, fixed=("k2", "k3", "p1", "p2")))
+    assert sentence.startswith(said)
+
+
 def test_a_known_place_is_kept_and_makes_the_cameras_better():
     truth, found = solved("two-sided", 2)
     _, held = solved("two-sided", 2, known={"back": truth.places["back"]})
@@ -113,6 +142,45 @@ def test_a_marker_that_is_taken_for_another_is_set_aside_and_the_rest_stays(name
     assert np.abs(off).max() < 4.5
     assert sum(found.through(each).set_aside["cam0"].sum() for each in truth.boards) == 4
     assert found.through(name).set_aside["cam0"].sum() == 4
+
+
+@pytest.fixture(scope="module")
+def parallel():
+    """Six frames of four markers that are all parallel to the sensor."""
+    rng = np.random.default_rng(1)
+    truth = virtual_boards.markers(rng, count=4, frames=6, askew=0, turn=0)
+    return truth, calibrate_boards(truth.observed(rng), truth.boards, fixed=("k2", "k3", "p1", "p2"))
+
+
+def test_boards_parallel_to_the_sensor_leave_the_focal_length_without_deviation(parallel):
+    truth, found = parallel
+    said = told_of(found, BoardsFile(truth.boards, {}, (), {}))
+    assert " ± not known, fy = " in next(sentence for sentence in said if sentence.startswith("cam0: fx = "))
+    assert any("cam0: the ± of fx" in sentence and "the corners do not decide" in sentence for sentence in said)
+    inspection = inspect(found.through(found.largest))
+    (finding,) = [each for each in inspection.findings if each.id == "unidentifiable"]
+    assert "fx" in finding.sentence
+    assert "fx" in inspection.as_tree()["cameras"][0]["undecided"]
+    assert "± not known" in inspection.as_text()
+
+
+def test_a_file_without_corners_tells_by_its_covariance_what_was_not_decided(parallel, tmp_path):
+    _, found = parallel
+    write(found.calibration, tmp_path / "camera.yaml", "opencv")
+    inspection = inspect(load(tmp_path / "camera.yaml"))
+    (finding,) = [each for each in inspection.findings if each.id == "unidentifiable"]
+    assert finding.value is None
+    assert "no corner moves" not in finding.sentence
+    (rows,) = inspection.summary.table().values()
+    assert rows["fx"].endswith("± not known")
+
+
+def test_the_derivatives_of_the_pixels_are_those_of_the_equations():
+    _, found = solved("two-sided", 4)
+    adjustment = replace(found.adjustment, sized=(0,))
+    parts = [Arrowhead.of(*adjustment._measured(name)) for name in adjustment.cameras]
+    whole = sum(parts[1:], start=parts[0])
+    assert np.allclose(whole.information, adjustment.normal_equations.information, rtol=1e-6, atol=1e-3)
 
 
 def test_the_equations_are_those_of_finite_differences():

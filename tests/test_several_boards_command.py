@@ -2,58 +2,34 @@
 
 from pathlib import Path
 
-import cv2
+import examples
 import numpy as np
 import pytest
+from examples import BEFORE_WALL, MARKERS, PLACES
 
-from camviz.cameras import Camera, Intrinsics
-from camviz.lenses import BrownConrady
-from camviz.poses import RigidTransform, Rotation
-from camviz_clinic.calibration.types import Board
-from camviz_clinic.checks.snapshots import together
+from camviz_clinic.commands.board_notes import size_sentence
 from camviz_clinic.commands.command import main
-from camviz_clinic.commands.several import read_boards, size_sentence
+from camviz_clinic.commands.several import read_boards
 from camviz_clinic.files import load
 
-NAMES = ("door", "shelf", "lamp", "desk")
 FILE = "".join(
     f'{name} = "--markers 4X4_50 --board 1x1 --first-id {number} --square-mm 120"\n'
-    for number, name in enumerate(NAMES)
+    for number, name in enumerate(MARKERS)
 )
-PLACES = RigidTransform.from_components(
-    [[0, 0, 0], [0.42, 0.02, 0.05], [0.02, 0.4, -0.04], [0.41, 0.42, 0.02]],
-    Rotation.from_rotvec([[0, 0, 0], [0.1, 0.3, 0.05], [-0.2, 0.1, 0.1], [0.2, -0.2, 0]]),
-)
-FRAMES = 10
 BIAS = 0.001  # of all lengths: a marker of 45 pixels is found 0.04 px too large
 
 
 @pytest.fixture(scope="module")
 def wall(tmp_path_factory):
-    rng = np.random.default_rng(4)
-    lens = BrownConrady(-0.1, 0.02, 0, 0)
-    left = Camera(Intrinsics.from_fov(640, 480, 60), lens)
-    right = left.at(RigidTransform.from_components([0.25, 0.01, 0.02], Rotation.from_rotvec([0.02, -0.15, 0.01])))
-    cameras = {"cam0": left, "cam1": right}
-    boards = [Board.marker_grid(1, 1, 0.12, "DICT_4X4_50", first_id=number) for number in range(4)]
-    folder = tmp_path_factory.mktemp("wall")
-    middle = RigidTransform.from_translation([-0.26, -0.26, 0])
-    for frame in range(FRAMES):
-        turn = Rotation.from_rotvec([*rng.normal(0, 0.35, 2), rng.normal(0, 0.2)])
-        away = [*rng.normal(0, 0.06, 2) + [0.1, 0], rng.uniform(1.1, 1.5)]
-        world_from_wall = RigidTransform.from_components(away, turn) * middle
-        for name, camera in cameras.items():
-            (folder / name).mkdir(exist_ok=True)
-            picture = together(camera, boards, camera.cam_from_world * world_from_wall * PLACES, rng)
-            cv2.imwrite(str(folder / name / f"{frame:02}.png"), picture)
-    (folder / "wall.toml").write_text(FILE, encoding="utf-8")
-    return folder, cameras
+    folder = tmp_path_factory.mktemp("room")
+    examples.shoot_wall(folder / "wall")
+    return folder
 
 
 @pytest.fixture
 def room(wall, monkeypatch):
-    monkeypatch.chdir(wall[0])
-    return wall[1]
+    monkeypatch.chdir(wall)
+    return BEFORE_WALL
 
 
 def stands(said, name):
@@ -63,14 +39,14 @@ def stands(said, name):
 
 
 def test_two_cameras_and_the_markers_of_a_wall_are_placed_told_of_and_written(room, capsys):
-    words = ["calibrate", "--rig", "cam0", "cam1", "--boards", "wall.toml", "--fix", "k3", "--workers", "1"]
+    words = ["calibrate", "--rig", "wall/cam0", "wall/cam1", "--boards", "wall.toml", "--fix", "k3", "--workers", "1"]
     assert main([*words, "-o", "rig.toml", "--places", "solved.toml", "--report", "rig.html"]) == 0
     said = capsys.readouterr().out
     back = load("rig.toml")
     assert np.linalg.norm(back.cameras["cam1"].centre - room["cam1"].centre) < 0.01
     distance, sigma = stands(said, "cam1")
     assert abs(distance - 1000 * np.linalg.norm(room["cam1"].centre)) < 4 * sigma + BIAS * distance
-    for number, name in enumerate(NAMES[1:], start=1):
+    for number, name in enumerate(MARKERS[1:], start=1):
         distance, sigma = stands(said, name)
         assert abs(distance - 1000 * np.linalg.norm(PLACES[number].translation)) < 4 * sigma + BIAS * distance
     assert "solved.toml: written; --boards reads it." in said
@@ -79,10 +55,10 @@ def test_two_cameras_and_the_markers_of_a_wall_are_placed_told_of_and_written(ro
 
 
 def test_places_that_were_written_are_read_and_held(room, capsys):
-    words = ["calibrate", "cam0", "--fix", "k3", "--workers", "1", "-o"]
+    words = ["calibrate", "wall/cam0", "--fix", "k3", "--workers", "1", "-o"]
     assert main([*words, "camera.yaml", "--boards", "wall.toml", "--places", "solved.toml"]) == 0
     free = capsys.readouterr().out
-    assert list(read_boards(Path("solved.toml")).known) == list(NAMES[1:])
+    assert list(read_boards(Path("solved.toml")).known) == list(MARKERS[1:])
     assert main([*words, "held.yaml", "--boards", "solved.toml"]) == 0
     held = capsys.readouterr().out
     assert "shelf stands " in free
@@ -116,7 +92,7 @@ def test_what_cannot_be_is_refused_in_one_sentence(room, capsys, text, words, wh
     if text is not None:
         Path("bad.toml").write_text(text, encoding="utf-8")
     file = "none.toml" if text is None else "bad.toml"
-    assert main(["calibrate", "cam0", "--boards", file, "--workers", "1", "-o", "out.yaml", *words]) == 2
+    assert main(["calibrate", "wall/cam0", "--boards", file, "--workers", "1", "-o", "out.yaml", *words]) == 2
     said = capsys.readouterr().err
     assert why in said
     assert len(said.strip().splitlines()) == 1

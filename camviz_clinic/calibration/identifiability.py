@@ -6,7 +6,7 @@ boards, or other parameters, make up for a change, no corner tells of it, and a 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,8 +31,8 @@ class Undecided:
 
     `changes` says by how much each one changes, by its name and in its own unit, where together they would shift the
     picture by 1 % of its longer side were the poses held (root of the sum of squares of what each does alone, RMS over
-    the picture). No corner then moves by more than `most` pixels. One standard deviation of the combination is
-    `deviation` times as much; `direction` (n,) is the change of all `names`.
+    the picture). No corner then moves by more than `most` pixels; NaN where no corners are known. One standard
+    deviation of the combination is `deviation` times as much; `direction` (n,) is the change of all `names`.
     """
 
     names: tuple[str, ...]
@@ -69,16 +69,35 @@ def undecided(adjustment: Adjustment, name: str, noise: float) -> tuple[Undecide
     follow = _follow(data, name)
     information = follow.T @ data.normal_equations.information @ follow
     shifts = _shifts(camera, names)
-    values, vectors = np.linalg.eigh(information / np.outer(shifts, shifts))
-    values = np.maximum(values, np.finfo(float).eps * max(values[-1], np.finfo(float).tiny))
-    deviations = min(noise, ORDINARY_NOISE) / np.sqrt(values)
-    longer = UNDECIDED * max(camera.intrinsics.width, camera.intrinsics.height)
-    visible = np.sqrt(np.maximum(np.diag(information), 0))
-    return tuple(
-        _combination(data, name, names, follow, longer * vector / shifts, visible, float(deviation / longer))
-        for deviation, vector in zip(deviations, vectors.T, strict=True)
-        if deviation > longer
+    return _combinations(
+        camera,
+        names,
+        shifts,
+        information / min(noise, ORDINARY_NOISE) ** 2,
+        lambda direction: _farthest(data, name, follow @ direction),
     )
+
+
+def undecided_by_covariance(camera: Camera, names: tuple[str, ...], covariance: Array) -> tuple[Undecided, ...]:
+    """The same of a camera without corners, whose file holds the covariance (n, n) of the parameters `names`.
+
+    Its inverse is the information, whatever the corners were of. How far one of them would move is not known: NaN.
+
+    >>> from camviz.cameras import Intrinsics
+    >>> camera = Camera(Intrinsics.from_fov(640, 480, 60))
+    >>> for sigma in (1.0, 300.0):  # pixels, of a focal length that both axes have in common
+    ...     covariance = np.eye(2) + sigma**2
+    ...     [list(each.changes) for each in undecided_by_covariance(camera, ("fx", "fy"), covariance)]
+    []
+    [['fx', 'fy']]
+    """
+    if not names or not np.isfinite(covariance).all():
+        return ()
+    shifts = _shifts(camera, names)
+    values, vectors = np.linalg.eigh(covariance * np.outer(shifts, shifts))
+    values = np.maximum(values, np.finfo(float).eps * max(values[-1], np.finfo(float).tiny))
+    information = (vectors / values) @ vectors.T * np.outer(shifts, shifts)
+    return _combinations(camera, names, shifts, information, lambda direction: np.nan)
 
 
 def undecided_names(adjustment: Adjustment, name: str) -> set[str]:
@@ -86,21 +105,31 @@ def undecided_names(adjustment: Adjustment, name: str) -> set[str]:
     return {key for each in undecided(adjustment, name, adjustment.sigma) for key in each.changes}
 
 
+def _combinations(
+    camera: Camera, names: tuple[str, ...], shifts: Array, information: Array, farthest: Callable[[Array], float]
+) -> tuple[Undecided, ...]:
+    """Those that this information (n, n), the inverse of a covariance, leaves undecided, the worst first."""
+    values, vectors = np.linalg.eigh(information / np.outer(shifts, shifts))
+    values = np.maximum(values, np.finfo(float).eps * max(values[-1], np.finfo(float).tiny))
+    deviations = 1 / np.sqrt(values)
+    longer = UNDECIDED * max(camera.intrinsics.width, camera.intrinsics.height)
+    visible = np.sqrt(np.maximum(np.diag(information), 0))
+    return tuple(
+        _combination(names, longer * vector / shifts, visible, farthest, float(deviation / longer))
+        for deviation, vector in zip(deviations, vectors.T, strict=True)
+        if deviation > longer
+    )
+
+
 def _combination(
-    data: Adjustment,
-    name: str,
-    names: tuple[str, ...],
-    follow: Array,
-    direction: Array,
-    visible: Array,
-    deviation: float,
+    names: tuple[str, ...], direction: Array, visible: Array, farthest: Callable[[Array], float], deviation: float
 ) -> Undecided:
     """In words: the parameters whose effects on the corners cancel, `visible` (n,) being that of one unit of each."""
     direction = direction * np.sign(direction[np.abs(direction * visible).argmax()] or 1.0)
     squares = (direction * visible) ** 2
     named = squares > PART * squares.sum()
     changes = {key: float(value) for key, value, said in zip(names, direction, named, strict=True) if said}
-    return Undecided(names, direction, changes, _farthest(data, name, follow @ direction), deviation)
+    return Undecided(names, direction, changes, farthest(direction), deviation)
 
 
 def _follow(data: Adjustment, name: str) -> Array:

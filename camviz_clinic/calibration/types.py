@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,9 @@ from camviz_clinic.calibration.denominator_prior import DenominatorPrior
 from camviz_clinic.calibration.line_delay import LineDelay
 from camviz_clinic.calibration.redundancy import Redundancy
 from camviz_clinic.calibration.stamp import Stamp
+
+if TYPE_CHECKING:
+    from camviz_clinic.calibration.identifiability import Undecided
 
 Mask = NDArray[np.bool_]
 
@@ -208,6 +211,8 @@ class Calibration:
         faults: What was mended in reading, where `load` was asked to mend.
         redundant: What the file says twice, in its order.
         stamps: What the calibration of each camera holds for.
+        undecided: Combinations of each camera's intrinsics that the corners do not decide, where these were more than
+            `detections` holds, as those of several boards; the worst first. No file holds it.
         line_delays: How long each camera's rolling shutter takes from row to row, where that is known. The corners are
             then where a shutter of all rows at once would have seen them.
 
@@ -241,6 +246,7 @@ class Calibration:
     redundant: tuple[Redundancy, ...] = ()
     stamps: Mapping[str, Stamp] = field(default_factory=dict)
     line_delays: Mapping[str, LineDelay] = field(default_factory=dict)
+    undecided: Mapping[str, tuple[Undecided, ...]] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         if not self.cameras:

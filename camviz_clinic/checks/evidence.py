@@ -13,7 +13,7 @@ from camviz.cameras import Camera
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.cross_validation import HeldOut, held_out
-from camviz_clinic.calibration.identifiability import Undecided, undecided
+from camviz_clinic.calibration.identifiability import Undecided, undecided, undecided_by_covariance
 from camviz_clinic.calibration.stamp import Stamp
 from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.checks.doctor.shown import Shown
@@ -160,12 +160,22 @@ class Evidence:
         return float(np.sqrt(max(adjustment.covariance[place, place], 0)))
 
     def undecided(self, name: str) -> tuple[Undecided, ...]:
-        """Combinations of a camera's intrinsics that its corners do not decide, the worst first; () without corners."""
+        """Combinations of a camera's intrinsics that its corners do not decide, the worst first.
+
+        By the corners that the calibration holds, unless it was solved from more of them and says so; without any, by
+        the covariance in the file; () without either.
+        """
         return self.once(("undecided", name), lambda: self._undecided(name))
 
     def _undecided(self, name: str) -> tuple[Undecided, ...]:
+        calibration = self.calibration
+        if name in calibration.undecided:
+            return calibration.undecided[name]
         if name not in self.observed:
-            return ()
+            covariance, names = calibration.intrinsics_covariance.get(name), calibration.estimated.get(name, ())
+            if covariance is None or name in calibration.detections:
+                return ()
+            return undecided_by_covariance(calibration.cameras[name], names, covariance)
         observed = self.observed[name]
         return undecided(self._with_others(name) or observed.adjustment, name, observed.noise)
 

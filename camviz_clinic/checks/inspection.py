@@ -134,6 +134,7 @@ class Inspection:
             "findings": [words.tree(finding) for finding in self.findings],
             "checked": list(self.checked),
             "skipped": [{"id": id, "why": why} for id, why in self.skipped],
+            **self._notes(),
             "ignored": [{"id": id, "count": count} for id, count in words.count_of_each(self.ignored).items()],
         }
 
@@ -142,6 +143,10 @@ class Inspection:
         if self.calibration is None or (found := bend_mm(self.calibration)) is None:
             return {}
         return {"board_warp": dict(zip(("mm", "sigma_mm"), found, strict=True))}
+
+    def _notes(self) -> dict[str, Any]:
+        """What whoever solved or read it had to say, in sentences; nothing where there is none."""
+        return {"notes": list(self.calibration.notes)} if self.calibration and self.calibration.notes else {}
 
     def _camera(self, name: str, camera: Camera) -> dict[str, Any]:
         grid = camera.intrinsics

@@ -157,12 +157,9 @@ class Summary:
 
     def undecided(self, name: str) -> tuple[str, ...]:
         """The parameters of a camera whose ± is withheld, because its corners do not decide them (`unidentifiable`)."""
-        found = {key for each in self.evidence.undecided(name) for key in each.changes}
-        return (
-            tuple(key for key in self.evidence.observed[name].adjustment.estimated[name] if key in found)
-            if found
-            else ()
-        )
+        combinations = self.evidence.undecided(name)
+        found = {key for each in combinations for key in each.changes}
+        return tuple(key for key in combinations[0].names if key in found) if found else ()
 
     @property
     def withheld(self) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from camviz_clinic.commands.board_notes import board_sentences
 from camviz_clinic.commands.boards import add_board, board_of
 from camviz_clinic.commands.common import Parser, Refusal, narrator, write_whole
 from camviz_clinic.commands.outcome import judged, stamped, written
@@ -33,8 +34,6 @@ They are fixed to each other, and where is solved for; those that somebody moves
 A place that is known is written as camviz writes it with --places: door = {board = "...", place = [[...], ...]}.
 """
 APART = "apart"
-CERTAIN = 4.0  # times its σ must a board be off the size that is said
-WORTH = 0.002  # of its size: less is as good as a printer is
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +116,8 @@ def calibrate_several(
     except CannotCalibrate as error:
         raise Refusal(f"{error}.") from error
     inspected = solved.through(solved.largest)
-    calibration = stamped(solved.calibration, inspected, list(cameras.values()), options)
+    noted = replace(solved.calibration, notes=(*solved.calibration.notes, *board_sentences(solved)))
+    calibration = stamped(noted, inspected, list(cameras.values()), options)
     left_out, told = written(calibration, options, form), narrator(options.output)
     for sentence in [*told_of(solved, file), *calibration.notes]:
         told(sentence)
@@ -125,7 +125,7 @@ def calibrate_several(
     if options.places:
         write_whole(options.places, lambda path: path.write_text(places_toml(solved, file), encoding="utf-8"))
         told(f"{options.places}: written; --boards reads it.")
-    inspected = replace(inspected, stamps=calibration.stamps, source=options.output)
+    inspected = replace(inspected, stamps=calibration.stamps, source=options.output, notes=calibration.notes)
     return judged(inspected, folders, options, gate)
 
 
@@ -167,10 +167,12 @@ def told_of(solved: SolvedBoards, file: BoardsFile) -> list[str]:
     """What came out, in sentences."""
     import numpy as np
 
+    from camviz_clinic.checks.summary import Summary
     from camviz_clinic.commands.telling import camera_line
     from camviz_clinic.rigs import relative_pose
 
     adjustment, calibration = solved.adjustment, solved.calibration
+    summary = Summary.of(solved.through(solved.largest))
     said = [f"{name}: in no picture, left out." for name in file.boards if name not in solved.boards]
     for name, camera in calibration.cameras.items():
         of = dict(
@@ -178,7 +180,8 @@ def told_of(solved: SolvedBoards, file: BoardsFile) -> list[str]:
         )
         used = adjustment.used[name]
         rms = float(np.sqrt(np.mean(np.sum(adjustment.residuals[name][used] ** 2, axis=-1))))
-        said.append(camera_line(name, camera.intrinsics, of, rms=rms, used=used))
+        said.append(camera_line(name, camera.intrinsics, of, summary.undecided(name), rms=rms, used=used))
+    said += summary.withheld
     first = next(iter(calibration.cameras))
     beside = [relative_pose(adjustment, name, first) for name in calibration.cameras if name != first]
     beside += [solved.place(name) for group in solved.groups for name in group[1:]]
@@ -192,7 +195,7 @@ def told_of(solved: SolvedBoards, file: BoardsFile) -> list[str]:
             )
     for group in solved.groups[1:]:
         said.append(f"{' and '.join(group)} {'moves' if len(group) == 1 else 'move'} apart from {solved.groups[0][0]}.")
-    return said + [sentence for name, size in solved.sizes.items() if (sentence := size_sentence(name, *size))]
+    return said
 
 
 def places_toml(solved: SolvedBoards, file: BoardsFile) -> str:
@@ -204,17 +207,6 @@ def places_toml(solved: SolvedBoards, file: BoardsFile) -> str:
         rows = ", ".join("[" + ", ".join(f"{value:.9g}" for value in row) + "]" for row in pose.as_matrix()[:3])
         lines.append(f"{name} = {words if name in firsts else f'{{board = {words}, place = [{rows}]}}'}")
     return "\n".join(lines) + "\n"
-
-
-def size_sentence(name: str, size: float, sigma: float) -> str:
-    """That a board has not the size that is said, where this is certain and matters; empty otherwise."""
-    if not (abs(size - 1) > CERTAIN * sigma and abs(size - 1) > WORTH):
-        return ""
-    word = "larger" if size > 1 else "smaller"
-    return (
-        f"{name} is {pm(100 * abs(size - 1), 100 * sigma)} % {word} than it is said to be, beside the other boards: "
-        "measure them, and give the true sizes."
-    )
 
 
 def _list(group: Sequence[str]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.detection import CannotCalibrate, Detections, seen
+from camviz_clinic.calibration.identifiability import Undecided, undecided
 from camviz_clinic.calibration.types import Board, Calibration, Mask
 from camviz_clinic.rigs.graph import Indices, cross
 from camviz_clinic.rigs.places import RelativePose
@@ -102,6 +104,12 @@ class SolvedBoards:
             intrinsics_covariance={name: covariance[place, place] for name, place in places.items()},
         )
 
+    @cached_property
+    def undecided(self) -> dict[str, tuple[Undecided, ...]]:
+        """By camera, the combinations of its intrinsics that the corners of all boards do not decide."""
+        adjustment = self.adjustment
+        return {name: undecided(adjustment, name, adjustment.sigma) for name in adjustment.cameras}
+
     def through(self, board: str) -> Calibration:
         """The same cameras with what they saw of one board: for the views and checks, which take one.
 
@@ -127,6 +135,7 @@ class SolvedBoards:
             detections=corners,
             cam_from_board={name: each.cam_from_world * world_from_board for name, each in adjustment.cameras.items()},
             set_aside={name: seen(corners[name]) & ~used[name] for name in corners},
+            undecided=self.undecided,
             per_view_errors={name: _rms(residuals[name], used[name]) for name in corners},
             pictures={
                 name: tuple(named.get(int(frame), f"frame {frame + 1} without a board") for frame in self.frames[views])

@@ -122,6 +122,16 @@ class TargetAdjustment(RigAdjustment):
         """Where the corners of each board are."""
         return tuple(self.board.rows_of(part) for part in range(len(self.board.parts)))
 
+    def jacobian(self, name: str) -> tuple[Array, Array]:
+        """As `Linearisation.jacobian`, also by where the boards are and by their sizes."""
+        by_shared, by_pose = super().jacobian(name)
+        part, views = self.parts[name], np.any(self.used[name][self.posed], axis=1)
+        extra = part.own >= len(self.parameters) - len(self.sized) - len(POSE) * len(self.free)
+        changed = by_shared[views]
+        changed[..., part.own[extra]] = part.by_own[..., extra].reshape(*changed.shape[:-1], int(extra.sum()))
+        by_shared[views] = changed
+        return by_shared, by_pose
+
     def _part(self, name: str) -> Seen:
         seen, used = super()._part(name), self.used[name]
         views = np.flatnonzero(used.any(axis=1))

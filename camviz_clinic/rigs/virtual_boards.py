@@ -81,9 +81,7 @@ def two_sided(rng: np.random.Generator, cameras: int = 4, *, frames: int = 30) -
     upright = np.column_stack(
         [rng.normal(0, 0.3, frames), rng.uniform(-np.pi, np.pi, frames), rng.normal(0, 0.3, frames)]
     )
-    middle = RigidTransform.from_translation(-FRONT.corners.mean(axis=0))
-    swings = RigidTransform.from_components(rng.normal(0, 0.1, (frames, 3)), Rotation.from_rotvec(upright))
-    poses = first * (swings * middle)
+    poses = _carried(rng, first, FRONT, Rotation.from_rotvec(upright), 0.1)
     return VirtualBoards(by_name, {"front": FRONT, "back": BACK}, places, {"front": poses, "back": poses})
 
 
@@ -109,13 +107,16 @@ def back_to_back(rng: np.random.Generator, *, frames: int = 25, turn: float = 0.
     return VirtualBoards(cameras, boards, places, {"ahead": poses, "behind": poses})
 
 
-def markers(rng: np.random.Generator, *, count: int = 12, frames: int = 40) -> VirtualBoards:
+def markers(
+    rng: np.random.Generator, *, count: int = 12, frames: int = 40, askew: float = 0.25, turn: float = 0.35
+) -> VirtualBoards:
     """One camera before loose markers, each stuck somewhere on a wall and a little askew.
 
     Args:
         rng: Random numbers.
         count: Of the markers.
         frames: How many pictures.
+        askew, turn: Standard deviation of the markers' and of the camera's turns about each axis, in radians.
 
     Returns: VirtualBoards of "marker0", "marker1" …
     """
@@ -123,9 +124,9 @@ def markers(rng: np.random.Generator, *, count: int = 12, frames: int = 40) -> V
     names = [f"marker{number}" for number in range(count)]
     boards = {name: Board.marker_grid(1, 1, 0.08, "DICT_4X4_50", first_id=i) for i, name in enumerate(names)}
     at = [0.25 * np.array([i % 4, i // 4, 0]) + rng.normal(0, [0.02, 0.02, 0.1]) for i in range(count)]
-    wall = RigidTransform.from_components(at, Rotation.from_rotvec(rng.normal(0, 0.25, (count, 3))))
+    wall = RigidTransform.from_components(at, Rotation.from_rotvec(rng.normal(0, askew, (count, 3))))
     steps = np.column_stack([rng.normal(0, 0.15, (frames, 2)), rng.uniform(0.8, 1.6, frames)])
-    turns = Rotation.from_rotvec(rng.normal(0, 0.35, (frames, 3)))
+    turns = Rotation.from_rotvec(rng.normal(0, turn, (frames, 3)))
     middle = RigidTransform.from_translation(-np.mean(at, axis=0))
     poses = RigidTransform.from_components(steps, turns) * middle * wall[0]
     places = {name: wall[0].inv() * wall[i] for i, name in enumerate(names)}
@@ -147,9 +148,16 @@ def parting(rng: np.random.Generator, cameras: int = 3, *, frames: int = 20) -> 
     for name, board in (("one", FRONT), ("other", BACK)):
         towards = Rotation.from_rotvec([0, -np.radians(25) * (cameras - 1) / 2, 0])
         turns = towards * Rotation.from_rotvec(rng.normal(0, 0.3, (frames, 3)))
-        middle = RigidTransform.from_translation(-board.corners.mean(axis=0))
-        poses[name] = first * (RigidTransform.from_components(rng.normal(0, 0.15, (frames, 3)), turns) * middle)
+        poses[name] = _carried(rng, first, board, turns, 0.15)
     return VirtualBoards(by_name, {"one": FRONT, "other": BACK}, dict.fromkeys(poses, RigidTransform.identity()), poses)
+
+
+def _carried(
+    rng: np.random.Generator, first: RigidTransform, board: Board, turns: Rotation, spread: float
+) -> RigidTransform:
+    """A board's poses turned about its middle, which strays by `spread` metres about the middle of the room `first`."""
+    middle = RigidTransform.from_translation(-board.corners.mean(axis=0))
+    return first * (RigidTransform.from_components(rng.normal(0, spread, (len(turns), 3)), turns) * middle)
 
 
 def misprinted(truth: VirtualBoards, board: str, factor: float) -> VirtualBoards:

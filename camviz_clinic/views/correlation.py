@@ -17,7 +17,7 @@ from camviz.draw.readout import signed
 from camviz.draw.shades import Shades, bar
 from camviz.lenses.base import Array
 from camviz.views.base import View, choice
-from camviz_clinic.calibration.identifiability import undecided_names
+from camviz_clinic.calibration.identifiability import undecided_by_covariance, undecided_names
 from camviz_clinic.views.observations import Missing
 from camviz_clinic.views.uncertainty import adjusted, determined
 
@@ -58,7 +58,9 @@ class CorrelationView(View):
         except Missing as missing:
             if name not in calibration.intrinsics_covariance or name not in calibration.estimated:
                 raise missing
-        return cls(calibration.estimated[name], calibration.intrinsics_covariance[name])
+        names, covariance = calibration.estimated[name], calibration.intrinsics_covariance[name]
+        combinations = undecided_by_covariance(calibration.cameras[name], names, covariance)
+        return cls(names, covariance, undecided=frozenset(key for each in combinations for key in each.changes))
 
     @classmethod
     def about(cls, adjustment: Any) -> CorrelationView:

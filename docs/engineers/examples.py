@@ -36,6 +36,15 @@ RIGHT = Camera(Intrinsics(640, 480, 528, 528, 317, 241), BrownConrady(-0.21, 0.0
 )
 FILMING = Camera(Intrinsics(320, 240, 265, 266, 161, 119), BrownConrady(-0.1, 0.02))
 KNOCKED = replace(LEFT, intrinsics=replace(LEFT.intrinsics, fx=538, fy=539))
+MARKERS = ("door", "shelf", "lamp", "desk")  # on a wall, where:
+PLACES = RigidTransform.from_components(
+    [[0, 0, 0], [0.42, 0.02, 0.05], [0.02, 0.4, -0.04], [0.41, 0.42, 0.02]],
+    Rotation.from_rotvec([[0, 0, 0], [0.1, 0.3, 0.05], [-0.2, 0.1, 0.1], [0.2, -0.2, 0]]),
+)
+BEFORE_WALL = {
+    "cam0": LEFT,
+    "cam1": RIGHT.at(RigidTransform.from_components([0.25, 0.01, 0.02], Rotation.from_rotvec([0.02, -0.15, 0.01]))),
+}
 VIEWS = 14
 NOISE = 10.0  # grey levels
 
@@ -115,26 +124,20 @@ def shoot_rig(folder: Path) -> None:
 
 
 def shoot_wall(folder: Path) -> None:
-    """Two cameras before four loose markers on a wall."""
-    rng = np.random.default_rng(4)
-    turns = Rotation.from_rotvec([[0, 0, 0], [0.1, 0.3, 0.05], [-0.2, 0.1, 0.1], [0.2, -0.2, 0]])
-    at = [[0, 0, 0], [0.42, 0.02, 0.05], [0.02, 0.4, -0.04], [0.41, 0.42, 0.02]]
-    places, middle = RigidTransform.from_components(at, turns), RigidTransform.from_translation([-0.26, -0.26, 0])
-    markers = [Board.marker_grid(1, 1, 0.12, "DICT_4X4_50", first_id=number) for number in range(4)]
-    beside = RigidTransform.from_components([0.25, 0.01, 0.02], Rotation.from_rotvec([0.02, -0.15, 0.01]))
-    cameras = {"cam0": LEFT, "cam1": RIGHT.at(beside)}
-    for name in cameras:
+    """Two cameras before four loose markers on a wall, and the file that names the markers beside the folder."""
+    rng, middle = np.random.default_rng(4), RigidTransform.from_translation([-0.26, -0.26, 0])
+    markers = [Board.marker_grid(1, 1, 0.12, "DICT_4X4_50", first_id=number) for number in range(len(MARKERS))]
+    for name in BEFORE_WALL:
         (folder / name).mkdir(parents=True)
     for frame in range(10):
         turn = Rotation.from_rotvec([*rng.normal(0, 0.35, 2), rng.normal(0, 0.2)])
         away = [*rng.normal(0, 0.06, 2) + [0.1, 0], rng.uniform(1.1, 1.5)]
         wall = RigidTransform.from_components(away, turn) * middle
-        for name, camera in cameras.items():
-            image = together(camera, markers, camera.cam_from_world * wall * places, rng)
+        for name, camera in BEFORE_WALL.items():
+            image = together(camera, markers, camera.cam_from_world * wall * PLACES, rng)
             cv2.imwrite(str(folder / name / f"{frame:02}.png"), image)
-    names = ("door", "shelf", "lamp", "desk")
     words = "--markers 4X4_50 --board 1x1 --square-mm 120 --first-id"
-    lines = [f'{name} = "{words} {number}"\n' for number, name in enumerate(names)]
+    lines = [f'{name} = "{words} {number}"\n' for number, name in enumerate(MARKERS)]
     (folder.parent / "wall.toml").write_text("".join(lines), encoding="utf-8")
 
 

@@ -114,6 +114,11 @@ def check(shape: Shape) -> None:
         raise ValueError(
             f"marker_size must be a length below square_size = {shape.square_size}, got {shape.marker_size}"
         )
+    check_printed(shape)
+
+
+def check_printed(shape: Shape) -> None:
+    """ValueError for markers that cannot be printed so: their border and their first number."""
     if not 1 <= shape.border_bits <= WIDEST_BORDER:
         raise ValueError(f"border_bits must be 1 or {WIDEST_BORDER} cells, got {shape.border_bits}")
     if shape.first_id < 0:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camviz_clinic.calibration.boards.aprilgrid import measures, points, tag_size, tags
-from camviz_clinic.calibration.boards.charuco import WIDEST_BORDER, marker_dictionary, printed
+from camviz_clinic.calibration.boards.charuco import check_printed, marker_dictionary, printed
 from camviz_clinic.calibration.boards.kind import Area, Array, BoardKind, Drawing, Gray, Shape, cells, millimetres
 
 QUIET = 0.25  # of a marker's side: the white around the outer ones
@@ -152,10 +152,7 @@ def check(shape: Shape) -> None:
         raise ValueError(
             f"marker_size must be a marker's side, below square_size = {shape.square_size}, got {shape.marker_size}"
         )
-    if not 1 <= shape.border_bits <= WIDEST_BORDER:
-        raise ValueError(f"border_bits must be 1 or {WIDEST_BORDER} cells, got {shape.border_bits}")
-    if shape.first_id < 0:
-        raise ValueError(f"first_id must be the number of a marker, from 0, got {shape.first_id}")
+    check_printed(shape)
 
 
 def says(shape: Shape) -> str:

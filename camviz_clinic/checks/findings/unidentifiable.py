@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
+from camviz.cameras import Camera
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.identifiability import Undecided
 from camviz_clinic.calibration.jacobian import PINHOLE
 from camviz_clinic.calibration.types import Calibration
 from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.judgement import listed
-from camviz_clinic.checks.observed import Observed
 from camviz_clinic.checks.refit import far_columns
 from camviz_clinic.checks.registry import Finding, Rng, finding
 from camviz_clinic.checks.virtual import single, single_in_the_middle
@@ -51,24 +51,27 @@ STANDARD = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 )
 def unidentifiable(evidence: Evidence) -> Iterator[Finding]:
     """The check looks for changes of the parameters, taken together, which the poses of the boards make up for. It
-    counts what corners say, and not what a solver assumes.
+    counts what corners say, and not what a solver assumes. Of a file without corners it reads the covariance.
     """
-    for name, observed in evidence.with_corners().items():
-        found = evidence.undecided(name)
+    combinations = {name: evidence.undecided(name) for name in {**evidence.observed, **evidence.cameras}}
+    if not any(combinations.values()) and not evidence.calibration.undecided:
+        evidence.with_corners()
+    for name, found in combinations.items():
         if found:
-            far = [_far(observed, each) for each in found]
+            camera = evidence.calibration.cameras[name]
+            far = [_far(camera, each) for each in found]
             worst = int(np.argmax(far)) if max(far) > HARMFUL_PX else 0
             severity = "warning" if far[worst] > HARMFUL_PX else "note"
             sentence = f"{name}: {_said(found, worst, far[worst])}"
-            cause, remedy = _settled(observed, found[worst])
-            yield unidentifiable.found(
-                sentence, found[worst].most, "px", name, severity=severity, causes=(cause,), remedy=remedy
-            )
+            cause, remedy = _settled(camera, found[worst])
+            most = found[worst].most
+            value = most if np.isfinite(most) else None
+            yield unidentifiable.found(sentence, value, "px", name, severity=severity, causes=(cause,), remedy=remedy)
 
 
-def _far(observed: Observed, one: Undecided) -> float:
+def _far(camera: Camera, one: Undecided) -> float:
     """How far a far point is seen elsewhere in pixels, RMS over the image, once a turn of the camera is taken out."""
-    return float(np.linalg.norm(far_columns(observed.camera, one.names) @ one.direction))
+    return float(np.linalg.norm(far_columns(camera, one.names) @ one.direction))
 
 
 def _said(found: tuple[Undecided, ...], worst: int, far: float) -> str:
@@ -77,7 +80,8 @@ def _said(found: tuple[Undecided, ...], worst: int, far: float) -> str:
     amounts = [_amount(key, value) for key, value in list(changes.items())[:MOST_NAMED]]
     said = f"the corners do not decide {listed(tuple(changes))}{' together' * (len(changes) > 1)}. "
     said += f"Such a change is {', '.join(amounts)}{', …' * (len(changes) > MOST_NAMED)}. "
-    said += f"Where the boards follow it, no corner moves by more than {found[worst].most:.2g} px. "
+    if np.isfinite(found[worst].most):
+        said += f"Where the boards follow it, no corner moves by more than {found[worst].most:.2g} px. "
     if far > HARMFUL_PX:
         said += f"Far points would be seen {far:.2g} px elsewhere (RMS over the image)."
     else:
@@ -89,10 +93,10 @@ def _amount(name: str, value: float) -> str:
     return f"{name} {value:+.3g}{' px' * (name in PINHOLE)}".replace("-", "−")
 
 
-def _settled(observed: Observed, one: Undecided) -> tuple[str, str]:
+def _settled(camera: Camera, one: Undecided) -> tuple[str, str]:
     """Where it comes from and what would decide it, by the parameters that go together."""
     together = set(one.changes)
-    if together & (OF_REFINEMENT | set(observed.camera.lens.denominator_terms)):
+    if together & (OF_REFINEMENT | set(camera.lens.denominator_terms)):
         return TERMS
     return ALIKE if together & set(PINHOLE) and "xi" not in together else EMPTY
 
