@@ -6,8 +6,8 @@ boards, or other parameters, make up for a change, no corner tells of it, and a 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,28 +18,12 @@ from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.arrowhead import inverse
 from camviz_clinic.calibration.difference import pixel_grid
 from camviz_clinic.calibration.jacobian import pixel_jacobian
+from camviz_clinic.calibration.undecided import Undecided
 
 UNDECIDED = 0.01  # of the picture's longer side: what is known of a camera before any picture was taken
 PART = 0.01  # of the squares of a combination: parameters with less are not named
 ORDINARY_NOISE = 0.3  # pixels: corners that scatter more have a trouble of their own
 GRID = (24, 18)  # points of the picture
-
-
-@dataclass(frozen=True, eq=False)
-class Undecided:
-    """Intrinsics that may change together, the boards' poses following, while hardly a corner moves.
-
-    `changes` says by how much each one changes, by its name and in its own unit, where together they would shift the
-    picture by 1 % of its longer side were the poses held (root of the sum of squares of what each does alone, RMS over
-    the picture). No corner then moves by more than `most` pixels; NaN where no corners are known. One standard
-    deviation of the combination is `deviation` times as much; `direction` (n,) is the change of all `names`.
-    """
-
-    names: tuple[str, ...]
-    direction: Array
-    changes: Mapping[str, float]
-    most: float
-    deviation: float
 
 
 def undecided(adjustment: Adjustment, name: str, noise: float) -> tuple[Undecided, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,9 +19,7 @@ from camviz_clinic.calibration.denominator_prior import DenominatorPrior
 from camviz_clinic.calibration.line_delay import LineDelay
 from camviz_clinic.calibration.redundancy import Redundancy
 from camviz_clinic.calibration.stamp import Stamp
-
-if TYPE_CHECKING:
-    from camviz_clinic.calibration.identifiability import Undecided
+from camviz_clinic.calibration.undecided import Undecided
 
 Mask = NDArray[np.bool_]
 
@@ -211,10 +209,10 @@ class Calibration:
         faults: What was mended in reading, where `load` was asked to mend.
         redundant: What the file says twice, in its order.
         stamps: What the calibration of each camera holds for.
-        undecided: Combinations of each camera's intrinsics that the corners do not decide, where these were more than
-            `detections` holds, as those of several boards; the worst first. No file holds it.
         line_delays: How long each camera's rolling shutter takes from row to row, where that is known. The corners are
             then where a shutter of all rows at once would have seen them.
+        undecided: Combinations of each camera's intrinsics that the corners do not decide, where these were more than
+            `detections` holds, as those of several boards; the worst first. No file holds it.
 
     Raises: ValueError without any camera.
 

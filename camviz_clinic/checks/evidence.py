@@ -13,9 +13,10 @@ from camviz.cameras import Camera
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.cross_validation import HeldOut, held_out
-from camviz_clinic.calibration.identifiability import Undecided, undecided, undecided_by_covariance
+from camviz_clinic.calibration.identifiability import undecided, undecided_by_covariance
 from camviz_clinic.calibration.stamp import Stamp
 from camviz_clinic.calibration.types import Board, Calibration
+from camviz_clinic.calibration.undecided import Undecided
 from camviz_clinic.checks.doctor.shown import Shown
 from camviz_clinic.checks.observed import Observed
 from camviz_clinic.checks.rig import StereoPair, board_poses, pairs

@@ -14,8 +14,9 @@ from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.detection import CannotCalibrate, Detections, seen
-from camviz_clinic.calibration.identifiability import Undecided, undecided
+from camviz_clinic.calibration.identifiability import undecided
 from camviz_clinic.calibration.types import Board, Calibration, Mask
+from camviz_clinic.calibration.undecided import Undecided
 from camviz_clinic.rigs.graph import Indices, cross
 from camviz_clinic.rigs.places import RelativePose
 from camviz_clinic.rigs.rejection import sentences

@@ -9,9 +9,9 @@ import numpy as np
 
 from camviz.cameras import Camera
 from camviz_clinic.calibration.adjustment import Adjustment
-from camviz_clinic.calibration.identifiability import Undecided
 from camviz_clinic.calibration.jacobian import PINHOLE
 from camviz_clinic.calibration.types import Calibration
+from camviz_clinic.calibration.undecided import Undecided
 from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.judgement import listed
 from camviz_clinic.checks.refit import far_columns
