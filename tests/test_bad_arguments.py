@@ -36,7 +36,7 @@ MISTAKES = {
     "one path": (lambda: detect("a.png", BOARD), "pictures must be a list of paths, got the one path 'a.png'"),
     "an unknown finder": (
         lambda: detect(["a.png"], BOARD, finder="new"),
-        "finder must be one of auto, sectors, classic, got 'new'",
+        "finder must be one of auto, sectors, classic, saddles, got 'new'",
     ),
     "a picture of floats": (
         lambda: find_corners(GREY / 255, BOARD),

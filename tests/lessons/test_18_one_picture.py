@@ -221,7 +221,7 @@ def test_three_points_find_the_middle_and_are_delicate(says):
 
 def test_a_wall_seen_squarely(says):
     (turn,) = says("Pull turn up to 42°.")
-    (again,) = says("Turn on to 42°: the blue lines run parallel, and f is gone.")
+    (again,) = says("Turn on to 42°: do the blue lines still meet, and is there an f?")
     assert again.value == turn.value
     seen = camera(turn.value, aside=-3.0)
     upper, lower = (by_opencv(seen, edge) for edge in edges()["x"])

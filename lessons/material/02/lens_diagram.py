@@ -103,7 +103,7 @@ def _sensor(panel: Panel, lens: ThinLensCamera) -> str:
 
 def _name(panel: Panel, at: Array, words: str, class_: str) -> str:
     """A name over a place, moved as far as it takes to stay inside the panel."""
-    return svg.text((np.clip(at[0], 28, panel.width - 28), at[1]), words, f"{class_} halo middle")
+    return svg.text((np.clip(at[0], 36, panel.width - 36), at[1]), words, f"{class_} halo middle")
 
 
 def _focal_points(panel: Panel, f: float) -> str:

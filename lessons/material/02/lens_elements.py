@@ -117,6 +117,7 @@ class LensElementsView(View):
     def _plane(self, z: float, name: str, side: int) -> str:
         panel = self._panel
         top, bottom = panel.place([(z, 0.86 * panel.top), (z, 0.86 * panel.bottom)])
+        side = -side if not 30 < top[0] < panel.width - 30 else side  # where the border would cut the name
         return svg.line([top, bottom], "purple") + svg.text(top + (6 * side, 2), name, f"purple halo {_ANCHOR[side]}")
 
     def _glasses(self) -> list[Array]:

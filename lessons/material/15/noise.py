@@ -33,7 +33,9 @@ LEVELS = np.geomspace(2.0**-12, 8.0, 32)  # seconds: half a stop apart, and as m
 _WIDTH, _HEIGHT = 640, 480
 _CARD = (0.70, 0.60, 0.96, 0.95)  # left, top, right, bottom, as shares of the picture
 _WIDE = {"picture": 336, "curve": 624, "histogram": 620, "figures": 240}
-"""The panels in their order, and how wide each is in picture units; on a telephone the curve is scrolled sideways."""
+"""The panels in their order, and how wide each is in picture units."""
+_CURVE = {"curve": 404, "kinds": 220}
+"""The curve's two tiles: on a telephone the names of its lines stand below it."""
 
 
 @dataclass(frozen=True)
@@ -213,6 +215,7 @@ class PhotonTransferView(View):
         draw: dict[str, Callable[[], str]] = {
             "picture": self._picture_panel,
             "curve": lambda: self._transfer_panel(pixels),
+            "kinds": self._legend,
             "histogram": lambda: self._histogram_panel(dn),
             "figures": lambda: readout(self._told(pixels), self._corner("figures", 10, 26), (0, 37), (0, 17)),
         }
@@ -227,9 +230,9 @@ class PhotonTransferView(View):
         for name in filter(self._has, _WIDE):
             if sum(lines[-1].values()) + _WIDE[name] > WIDTH:
                 lines.append({})
-            lines[-1][name] = _WIDE[name]
+            lines[-1] |= _CURVE if name == "curve" else {name: _WIDE[name]}
         figures = 37 * (3 + 2 * self.fit + 2 * self._has("histogram")) + 12
-        return shortened(rows(*((310, line) for line in lines)), figures=figures, picture=284)
+        return shortened(rows(*((310, line) for line in lines)), figures=figures, picture=284, kinds=220)
 
     def _corner(self, tile: str, right: float, down: float) -> tuple[float, float]:
         """A place in a tile, from its upper left corner."""
@@ -280,12 +283,12 @@ class PhotonTransferView(View):
     def _transfer_panel(self, pixels: int) -> str:
         panel = self._plot
         ticks = plot.logarithmic(panel.left, panel.right), plot.logarithmic(panel.bottom, panel.top)
-        content, beside = self._curves(panel) + self._points(panel, pixels), self._legend()
+        content = self._curves(panel) + self._points(panel, pixels)
         how = "the difference of two" if self.difference else "one frame"
         label = "Noise over signal; drag or press the arrow keys to change the exposure"
         heading: dict[str, Any] = {"hint": "drag to change the exposure", "drag": "exposure", "label": label}
         names = "signal above the dark (DN)", "noise, σ (DN)"
-        return plot.plotted(panel, content, *names, *ticks, title=f"Noise of {how}", **heading) + beside
+        return plot.plotted(panel, content, *names, *ticks, title=f"Noise of {how}", **heading)
 
     def _curves(self, panel: Panel) -> str:
         """Every kind of noise as a line of its own slope, and all together."""
@@ -324,7 +327,7 @@ class PhotonTransferView(View):
         named = [(class_, f"{name} (slope {slope})") for (class_, slope), name in drawn]
         named += [("orange thick", "yours")] if self.yours else []
         lines = plot.legend(self._plot, [("ink", "all together"), *named])
-        x, y = self._corner("curve", 406, 34)
+        x, y = self._corner("kinds", 2, 34)
         return svg.element("svg", lines, x=x, y=y, width=214, height=226)
 
     def _points(self, panel: Panel, pixels: int) -> str:
