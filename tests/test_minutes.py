@@ -212,6 +212,13 @@ def test_each_departure_from_the_pattern_of_a_core_is_named(change, complaint):
     assert any(complaint in one for one in found), found
 
 
+def test_the_key_of_a_panel_is_no_panel():
+    lesson = deepcopy(EVERY["05"])
+    view = cell_of(lesson, "fold = explore(")
+    view.outputs[-1].data["text/html"] = "<img alt='' src=''>" * 2 + '<img alt="key" src="">'
+    assert not any("panels" in one for one in core_rules.complaints(lesson, "05"))
+
+
 @pytest.mark.parametrize("change", [longer(1300), more_lines(60)])
 def test_what_is_just_allowed_is_not_complained_of(change):
     lesson = deepcopy(EVERY["05"])

@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from camviz.draw.flow import WIDTH
+from camviz.draw.flow import SCROLLED, WIDTH
 from camviz.sensors import Sensor
 from camviz.sensors.common_random_numbers import Draw, exposed
 from camviz_clinic.measuring.noise.measurement import Measurement
@@ -166,7 +166,7 @@ def test_a_reader_s_noise_is_drawn_beside_the_right_one_whatever_it_does():
 def test_each_panel_opens_and_closes_and_is_drawn_alone():
     for name in PhotonTransferView.openable:
         drawn = PhotonTransferView(panels=name).figure(draft=True)
-        assert [tile.name for tile in drawn.tiles] == [name]
+        assert [tile.name for tile in drawn.tiles] == ([name, "key"] if name == "curve" else [name])
         assert ("camera" in drawn.photographs) == (name == "picture")
     few = PhotonTransferView(panels="picture", fit=False)
     for later in ("Histogram", "mostly from", "gain K", "on the card"):
@@ -194,6 +194,15 @@ def test_the_tiles_hold_what_stands_in_them(panels):
             assert other is tile or apart
     (x, y, _, height), told = view._layout["figures"], view._told()
     assert y + 26 + 37 * (len(told) - 1) + 17 < y + height
+
+
+def test_a_telephone_shows_the_whole_curve_and_all_names_of_its_lines():
+    """A wider tile would be scrolled there; each name stands in its own tile, also where a reader's curve is one."""
+    view = PhotonTransferView(panels="curve", yours=lambda electrons, *_: electrons)
+    curve, key = view.figure(draft=True).tiles
+    assert max(curve.cell[2], key.cell[2]) <= SCROLLED
+    assert key.body.count("<text") == 8
+    assert max(map(float, re.findall(r'<text[^>]* y="([\d.]+)"', key.body))) + 34 < key.cell[3]
 
 
 def test_a_full_card_is_called_full():

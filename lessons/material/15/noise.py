@@ -34,7 +34,7 @@ _WIDTH, _HEIGHT = 640, 480
 _CARD = (0.70, 0.60, 0.96, 0.95)  # left, top, right, bottom, as shares of the picture
 _WIDE = {"picture": 336, "curve": 624, "histogram": 620, "figures": 240}
 """The panels in their order, and how wide each is in picture units."""
-_CURVE = {"curve": 404, "kinds": 220}
+_CURVE = {"curve": 404, "key": 220}
 """The curve's two tiles: on a telephone the names of its lines stand below it."""
 
 
@@ -215,7 +215,7 @@ class PhotonTransferView(View):
         draw: dict[str, Callable[[], str]] = {
             "picture": self._picture_panel,
             "curve": lambda: self._transfer_panel(pixels),
-            "kinds": self._legend,
+            "key": self._legend,
             "histogram": lambda: self._histogram_panel(dn),
             "figures": lambda: readout(self._told(pixels), self._corner("figures", 10, 26), (0, 37), (0, 17)),
         }
@@ -232,7 +232,7 @@ class PhotonTransferView(View):
                 lines.append({})
             lines[-1] |= _CURVE if name == "curve" else {name: _WIDE[name]}
         figures = 37 * (3 + 2 * self.fit + 2 * self._has("histogram")) + 12
-        return shortened(rows(*((310, line) for line in lines)), figures=figures, picture=284, kinds=220)
+        return shortened(rows(*((310, line) for line in lines)), figures=figures, picture=284, key=220)
 
     def _corner(self, tile: str, right: float, down: float) -> tuple[float, float]:
         """A place in a tile, from its upper left corner."""
@@ -327,7 +327,7 @@ class PhotonTransferView(View):
         named = [(class_, f"{name} (slope {slope})") for (class_, slope), name in drawn]
         named += [("orange thick", "yours")] if self.yours else []
         lines = plot.legend(self._plot, [("ink", "all together"), *named])
-        x, y = self._corner("kinds", 2, 34)
+        x, y = self._corner("key", 2, 34)
         return svg.element("svg", lines, x=x, y=y, width=214, height=226)
 
     def _points(self, panel: Panel, pixels: int) -> str:
