@@ -558,7 +558,7 @@ def test_the_cube_s_side(says):
 
 
 def test_the_shapes_that_exercises_ask_for(says):
-    flat, solid = says("Image points (…, 2), in focal lengths, of points (…, 3), by (X, Y)/(Z + ξD)")
+    flat, solid = says("Return the image points (…, 2), in focal lengths, of points (…, 3), by (X, Y)/(Z + ξD)")
     ray, pixel = says("Write the unit rays (…, 3) of any number of image points (…, 2), by the larger root.")
     direction, point, least = says(
         "Where do directions (…, 3) meet the cube with faces at ±1 around the camera? The answer is a point (…, 3), "

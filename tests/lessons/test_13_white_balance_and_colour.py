@@ -652,13 +652,13 @@ def test_the_shapes_that_the_exercises_name(says):
     sensitivity = cases("13.response")[2][-1]
     (curves,) = says("`light` (n,), `reflectance` (..., n), `sensitivity` (n, 3).")
     assert curves == sensitivity.shape[1]
-    gains, colours = says("The gains (3,) for raw colours (..., 3), green's gain being 1.")
+    gains, colours = says("Return the gains (3,) for raw colours (..., 3), green's gain being 1.")
     (raw,) = cases("13.grey_world")[0]
     assert gains == len(lesson13.grey_world(raw))
     assert colours == raw.shape[-1]
     (channels,) = says("This is to develop raw colours (..., 3).")
     assert channels == raw.shape[-1]
-    rows, columns_ = says("The M (3, 3) with the least Σ |M raw − target|² over n colours.")
+    rows, columns_ = says("Find the M (3, 3) with the least Σ |M raw − target|² over n colours.")
     assert (rows.value, columns_.value) == lesson13.fit_matrix(*cases("13.fit_matrix")[1]).shape
     rows, columns_ = says("Write `between` for a light of any temperature: the mixture (3, 3) of the matrices")
     assert (rows.value, columns_.value) == lesson13.between(*cases("13.between")[0]).shape
