@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from camviz.cameras import Camera
-from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.detection import CannotCalibrate, Detections, seen
 from camviz_clinic.calibration.identifiability import undecided
-from camviz_clinic.calibration.types import Board, Calibration, Mask
+from camviz_clinic.calibration.problem import rms_by_view
+from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.calibration.undecided import Undecided
 from camviz_clinic.rigs.graph import Indices, cross
 from camviz_clinic.rigs.places import RelativePose
@@ -137,7 +137,7 @@ class SolvedBoards:
             cam_from_board={name: each.cam_from_world * world_from_board for name, each in adjustment.cameras.items()},
             set_aside={name: seen(corners[name]) & ~used[name] for name in corners},
             undecided=self.undecided,
-            per_view_errors={name: _rms(residuals[name], used[name]) for name in corners},
+            per_view_errors={name: rms_by_view(np.where(used[name], residuals[name], np.nan)) for name in corners},
             pictures={
                 name: tuple(named.get(int(frame), f"frame {frame + 1} without a board") for frame in self.frames[views])
                 for name, named in self.pictures.items()
@@ -272,9 +272,3 @@ def _groups(names: Sequence[str], apart: Sequence[Sequence[str]]) -> tuple[tuple
     rest = tuple(name for name in names if name not in moving)
     groups = [rest, *(tuple(name for name in names if name in group) for group in apart)]
     return tuple(sorted((group for group in groups if group), key=lambda group: list(names).index(group[0])))
-
-
-def _rms(squares: Array, used: Mask) -> Array:
-    """RMS (views,) in pixels over the corners in use; NaN in a view without one."""
-    count = used.sum(axis=1)
-    return np.sqrt(np.sum(squares, axis=1, where=used) / np.where(count, count, np.nan))

@@ -10,7 +10,6 @@ from typing import TypeVar
 import numpy as np
 
 from camviz.cameras import Camera
-from camviz.lenses.base import Array
 from camviz_clinic.calibration.board_warp import check_board_warp, with_board_warp
 from camviz_clinic.calibration.detection import CannotCalibrate, Detections, seen
 from camviz_clinic.calibration.outliers import Masks
@@ -166,7 +165,7 @@ def _calibration(adjustment: RigAdjustment, detections: Mapping[str, Detections]
         cam_from_board={
             name: camera.cam_from_world * adjustment.first_from_board for name, camera in adjustment.cameras.items()
         },
-        per_view_errors={name: _per_view_errors(adjustment, name) for name in adjustment.cameras},
+        per_view_errors={name: adjustment.view_rms(name) for name in adjustment.cameras},
         notes=sentences(adjustment),
         pictures=pictures,
         set_aside=adjustment.set_aside,
@@ -177,12 +176,3 @@ def _calibration(adjustment: RigAdjustment, detections: Mapping[str, Detections]
         board_warp=adjustment.warp,
         board_warp_covariance=adjustment.warp_covariance,
     )
-
-
-def _per_view_errors(adjustment: RigAdjustment, name: str) -> Array:
-    """RMS (frames,) in pixels over the corners in use, over all of a view that was set aside; NaN without a view."""
-    squared = np.sum(adjustment.residuals[name] ** 2, axis=-1)
-    used, there = adjustment.used[name], np.isfinite(squared)
-    counted = np.where(used.any(axis=1, keepdims=True), used, there)
-    count = counted.sum(axis=1)
-    return np.sqrt(np.sum(squared, axis=1, where=counted) / np.where(count, count, np.nan))
