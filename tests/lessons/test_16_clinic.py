@@ -632,7 +632,7 @@ def test_hand_and_eye(says):
     from camviz_school.course import notebooks
 
     cell = next(
-        one for one in notebooks.read(LESSONS / "16_clinic.ipynb").cells if one.source.startswith("from scipy.spatial")
+        one for one in notebooks.read(LESSONS / "16_clinic.ipynb").cells if "R = Rotation.align_vectors" in one.source
     )
     names: dict[str, object] = {"np": np}
     exec(cell.source.split("R = Rotation.align_vectors")[0], names)
