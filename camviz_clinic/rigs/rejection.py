@@ -10,7 +10,7 @@ import numpy as np
 
 from camviz.lenses.base import Array
 from camviz_clinic.calibration.detection import seen
-from camviz_clinic.calibration.outliers import FALSE_ALARMS, FINEST, Masks
+from camviz_clinic.calibration.outliers import FINEST, Masks, furthest
 from camviz_clinic.rigs.adjustment import RigAdjustment
 
 HOPELESS = 30.0  # times the median of all views: a view that is that far off has no say in the first solution
@@ -45,9 +45,7 @@ def deviation(adjustment: RigAdjustment, name: str, *, at_first: bool = False) -
 def limit(adjustment: RigAdjustment, name: str, *, at_first: bool = False) -> float:
     """The distance in pixels from which a corner of a camera is an outlier."""
     count = sum(int(seen(corners).sum()) for corners in adjustment.detections.values())
-    return max(deviation(adjustment, name, at_first=at_first), FINEST) * float(
-        np.sqrt(2 * np.log(count / FALSE_ALARMS))
-    )
+    return furthest(count, max(deviation(adjustment, name, at_first=at_first), FINEST))
 
 
 def outliers(adjustment: RigAdjustment, *, at_first: bool = False) -> Masks:
