@@ -18,8 +18,9 @@ from camviz_clinic.calibration.types import Board
 from camviz_clinic.calibration.uncertainty import projection_uncertainty
 from camviz_clinic.films import Film, FilmError, chosen_frames
 from camviz_clinic.films.candidates import candidates, sharpness, speed
-from camviz_clinic.films.choosing import greedy
+from camviz_clinic.films.choosing import greedy, most_telling_of_boards
 from camviz_clinic.films.virtual import take
+from camviz_clinic.rigs import calibrate_boards, virtual_boards
 
 BOARD = Board(7, 5, 0.03)
 CAMERA = Camera(Intrinsics(256, 192, 212, 212.4, 129, 95), BrownConrady(-0.1, 0.02))
@@ -241,6 +242,28 @@ def test_greedy_choice_is_near_the_best_of_all_choices():
     assert len(set(chosen.tolist())) == 4
     assert mean_variance(chosen) < 1.1 * every[0]
     assert mean_variance(chosen) < 0.6 * np.median(every)
+
+
+def test_of_several_boards_the_frames_are_chosen_by_which_cameras_and_places_are_known_best():
+    def mean_sigma(places):
+        some = {
+            camera: {
+                name: one.only([at for at, place in enumerate(one.places) if place in places])
+                for name, one in each.items()
+            }
+            for camera, each in seen.items()
+        }
+        covariance = calibrate_boards(some, truth.boards, robust=False).adjustment.corner_covariance
+        return float(np.sqrt(np.diag(covariance) / np.diag(whole)).mean())
+
+    rng = np.random.default_rng(2)
+    truth = virtual_boards.back_to_back(rng)
+    seen = truth.observed(rng)
+    whole = calibrate_boards(seen, truth.boards, robust=False).adjustment.corner_covariance
+    chosen = most_telling_of_boards(seen, truth.boards, "standard", 10)
+    assert len(chosen) == 10
+    assert mean_sigma(chosen) < mean_sigma(np.linspace(0, 24, 10).round())
+    assert mean_sigma(chosen) < 0.95 * np.mean([mean_sigma(rng.choice(25, 10, replace=False)) for _ in range(5)])
 
 
 def sigmas(detections):

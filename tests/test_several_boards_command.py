@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import cv2
 import examples
 import numpy as np
 import pytest
@@ -66,6 +67,28 @@ def test_places_that_were_written_are_read_and_held(room, capsys):
     fx = [load(file).cameras["camera"].intrinsics.fx for file in ("camera.yaml", "held.yaml")]
     assert fx[0] == pytest.approx(room["cam0"].intrinsics.fx, rel=0.02)
     assert fx[1] == pytest.approx(fx[0], rel=0.005)
+
+
+def film(path, pictures):
+    """Each picture rests for three frames."""
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 6.0, cv2.imread(str(pictures[0])).shape[1::-1])
+    for picture in pictures:
+        for _ in range(3):
+            writer.write(cv2.imread(str(picture)))
+    writer.release()
+
+
+def test_films_of_several_boards_give_frames_by_which_cameras_and_markers_are_placed(room, capsys):
+    for name in room:
+        film(f"{name}.avi", sorted(Path("wall", name).iterdir()))
+    words = ["calibrate", "--rig", "cam0.avi", "cam1.avi", "--boards", "wall.toml", "--fix", "k3", "--workers", "1"]
+    assert main([*words, "--frames", "7", "-o", "filmed.toml"]) == 0
+    said = capsys.readouterr().out
+    assert "cam0.avi: 7 frames were chosen, of " in said
+    assert np.linalg.norm(load("filmed.toml").cameras["cam1"].centre - room["cam1"].centre) < 0.02
+    for number, name in enumerate(MARKERS[1:], start=1):
+        distance, sigma = stands(said, name)
+        assert abs(distance - 1000 * np.linalg.norm(PLACES[number].translation)) < 4 * sigma + BIAS * distance
 
 
 @pytest.mark.parametrize(

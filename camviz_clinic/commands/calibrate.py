@@ -76,6 +76,7 @@ examples:
   camviz calibrate left/ --right right/ --board 9x6 --square-mm 25 -o stereo.yaml
   camviz calibrate --rig cam0/ cam1/ cam2/ --board 9x6 --square-mm 50 --model-of cam2=fisheye -o rig.toml
   camviz calibrate --rig cam0/ cam1/ --boards plate.toml --places solved.toml -o rig.toml
+  camviz calibrate --rig cam0.mp4 cam1.mp4 --boards plate.toml -o rig.toml
   camviz calibrate shots/ --board 10x7 --square-mm 18 --charuco 5X5_100 --marker-mm 13.5 --model fisheye
   camviz calibrate shots/ --board 9x6 --square-mm 25 --fail-on warning --limit rms-px=0.5 --junit clinic.xml
 """
@@ -188,7 +189,7 @@ def _of_stills(options: argparse.Namespace, of_films: tuple[str, ...]) -> int:
     folders = dict(zip(cameras, (each[0].parent for each in given if each), strict=False))
     if options.boards:
         look = partial(_looked, options=options)
-        return calibrate_several(cameras, folders, options, form, gate, look, _how(options))
+        return calibrate_several(cameras, folders, options, form, gate, look, _how(options), of_films)
     try:
         calibration = _of_corners(left, right, options) if options.corners else _of_pictures(cameras, options)
     except CannotCalibrate as error:

@@ -15,6 +15,7 @@ from camviz_clinic.commands.common import LACKING, Refusal, refuse_output
 from camviz_clinic.commands.pictures import PICTURES, Bar, pictures
 from camviz_clinic.commands.rig import held_of, models_of, told_apart
 from camviz_clinic.commands.rolling import film_in_bursts, is_rolling, refuse_no_film
+from camviz_clinic.commands.several import read_boards
 
 if TYPE_CHECKING:
     from camviz_clinic.films import Chosen
@@ -66,8 +67,6 @@ def as_pictures(options: argparse.Namespace, how: Mapping[str, Any]) -> Iterator
     if not films and not any(HEIC.fullmatch(path.suffix) for path in paths):
         yield ()
         return
-    if films and getattr(options, "boards", None):
-        raise Refusal("--boards is for pictures: films are looked through for one board alone.")
     for output in (options.output, options.report, options.junit):
         if output:
             refuse_output(output, "file", *films)
@@ -137,11 +136,12 @@ def _chosen(
     from camviz_clinic.films import FilmError, chosen_frames
     from camviz_clinic.films.taking import FRAMES
 
+    boards = read_boards(options.boards) if getattr(options, "boards", None) else None
+    board, frames = board_of(options) if not boards else boards.boards, options.frames or FRAMES
+    fixture = {"apart": boards.apart, "known": boards.known} if boards else None
     with Bar("frames read") as reading, Bar("frames looked at") as looking:
         try:
-            return chosen_frames(
-                takes, room, board_of(options), options.frames or FRAMES, reading=reading, looking=looking, **how
-            )
+            return chosen_frames(takes, room, board, frames, fixture=fixture, reading=reading, looking=looking, **how)
         except (FilmError, PictureError) as error:
             raise Refusal(f"{error}.") from error
         except ValueError as error:  # a parameter to fix that the model does not have

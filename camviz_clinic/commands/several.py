@@ -106,6 +106,7 @@ def calibrate_several(
     gate: Gate,
     look: Callable[[list[Path], Board], Detections],
     how: Mapping[str, Any],
+    of_films: tuple[str, ...],
 ) -> int:
     """Solve, write and tell; what is inspected is what the largest board shows."""
     from camviz_clinic.calibration import CannotCalibrate
@@ -116,7 +117,7 @@ def calibrate_several(
     except CannotCalibrate as error:
         raise Refusal(f"{error}.") from error
     inspected = solved.through(solved.largest)
-    noted = replace(solved.calibration, notes=(*solved.calibration.notes, *board_sentences(solved)))
+    noted = replace(solved.calibration, notes=(*of_films, *solved.calibration.notes, *board_sentences(solved)))
     calibration = stamped(noted, inspected, list(cameras.values()), options)
     left_out, told = written(calibration, options, form), narrator(options.output)
     for sentence in [*told_of(solved, file), *calibration.notes]:

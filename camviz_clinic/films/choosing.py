@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from camviz.cameras import Camera
 from camviz.lenses.base import Array
+from camviz.poses import RigidTransform
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.arrowhead import inverse
 from camviz_clinic.calibration.detection import Detections
 from camviz_clinic.calibration.solving import calibrate
 from camviz_clinic.calibration.types import Board
-from camviz_clinic.rigs import calibrate_rig, rig_of
+from camviz_clinic.rigs import calibrate_boards, calibrate_rig, rig_of
 from camviz_clinic.rigs.start import MOST_ALONE, board_poses, varied
 
 Indices = NDArray[np.intp]
@@ -57,6 +58,41 @@ def most_telling(
     views = np.flatnonzero(problem.posed)
     chosen = greedy(problem.by_view.information, _noise(problem)[views], count, sum(problem.by_priors[:1]))
     return tuple(sorted(places[view] for view in views[chosen]))
+
+
+def most_telling_of_boards(
+    found: Mapping[str, Mapping[str, Detections]],
+    boards: Mapping[str, Board],
+    model: str | Mapping[str, str],
+    count: int,
+    *,
+    apart: Sequence[Sequence[str]] = (),
+    known: Mapping[str, RigidTransform] | None = None,
+    held: Mapping[str, Camera] | None = None,
+    fixed: Sequence[str] = (),
+) -> tuple[int, ...]:
+    """As `most_telling`, of several boards: by which moments the cameras and the boards' places are known best.
+
+    Args:
+        found: By camera and board.
+        boards, model, apart, known, held, fixed: As of `calibrate_boards`.
+        count: How many may be chosen.
+
+    Returns: In their order; all there are, where they are not more than `count`.
+    Raises: CannotCalibrate where these views do not give the cameras.
+    """
+    places = sorted({place for each in found.values() for one in each.values() for place in one.places})
+    if len(places) <= count:
+        return tuple(places)
+    solved = calibrate_boards(found, boards, model, apart=apart, known=known, held=held, fixed=fixed, robust=False)
+    problem = solved.adjustment
+    frames, of_view = np.unique(solved.frames[problem.posed], return_inverse=True)
+    information = np.zeros((len(frames), *problem.by_view.information.shape[1:]))
+    np.add.at(information, of_view, problem.by_view.information)
+    noise = np.zeros(len(frames))
+    np.maximum.at(noise, of_view, _noise(problem)[problem.posed])
+    chosen = greedy(information, noise, count, sum(problem.by_priors[:1]))
+    return tuple(sorted(places[frame] for frame in frames[chosen]))
 
 
 def greedy(information: Array, noise: Array, count: int, assumed: Array | float = 0.0) -> Indices:

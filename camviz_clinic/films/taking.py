@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from camviz.cameras import Camera
-from camviz_clinic.calibration.detection import CannotCalibrate, Detections, detect
+from camviz_clinic.calibration.detection import CannotCalibrate, Detections, NoBoard, detect
 from camviz_clinic.calibration.types import Board
 from camviz_clinic.films.candidates import FilmedMoment, candidates
-from camviz_clinic.films.choosing import most_telling
+from camviz_clinic.films.choosing import most_telling, most_telling_of_boards
 from camviz_clinic.films.reading import Film
 
 FRAMES = 30
@@ -47,12 +47,13 @@ class Chosen:
 class FrameChoice:
     """How frames are chosen: what `chosen_frames` takes beside films and a folder."""
 
-    board: Board
+    boards: Mapping[str, Board]  # one has no name
     frames: int = FRAMES
     model: str | Mapping[str, str] = "standard"
     held: Mapping[str, Camera] | None = None
     fixed: Sequence[str] = ()
     search: Mapping[str, Any] | None = None
+    fixture: Mapping[str, Any] | None = None
 
     @property
     def looked_at(self) -> int:
@@ -62,13 +63,14 @@ class FrameChoice:
 def chosen_frames(
     takes: Sequence[Mapping[str, Path_]],
     folder: Path_,
-    board: Board,
+    board: Board | Mapping[str, Board],
     frames: int = FRAMES,
     *,
     model: str | Mapping[str, str] = "standard",
     held: Mapping[str, Camera] | None = None,
     fixed: Sequence[str] = (),
     search: Mapping[str, Any] | None = None,
+    fixture: Mapping[str, Any] | None = None,
     reading: Step | None = None,
     looking: Step | None = None,
 ) -> Chosen:
@@ -83,10 +85,11 @@ def chosen_frames(
         takes: What was filmed at one time, by each camera's name its film. A camera may have several takes; several
             cameras begin to film at the same moment, and have one take.
         folder: Where the frames go, as PNG: `NAME_000123.png` for frame 123, counted from 0, of the film NAME.
-        board: What is filmed.
+        board: What is filmed; several boards by their names.
         frames: How many are chosen at most, for each camera.
         model, held, fixed: As of `calibrate_rig`.
         search: The keywords finder, workers and seconds of `detect`.
+        fixture: Of several boards the keywords apart and known of `calibrate_boards`.
         reading, looking: callable, called with the numbers of frames done and in all, while films are read and while
             the board is looked for.
 
@@ -102,7 +105,8 @@ def chosen_frames(
     """
     if frames < 1:
         raise ValueError(f"frames must be at least 1, got {frames}")
-    plan = FrameChoice(board, frames, model, held, fixed, search)
+    boards = {"": board} if isinstance(board, Board) else board
+    plan = FrameChoice(boards, frames, model, held, fixed, search, fixture)
     found, notes = _candidates(takes, Path(folder), plan, reading)
     left, showing = _choose(found, plan, looking)
     for place, candidate in enumerate(found):
@@ -146,26 +150,47 @@ def _labels(paths: Sequence[Path]) -> dict[Path, str]:
 
 
 def _choose(found: Sequence[FilmedMoment], plan: FrameChoice, looking: Step | None) -> tuple[list[int], dict[str, int]]:
-    """The chosen candidates' places, and by camera how many show the board."""
+    """The chosen candidates' places, and by camera how many show a board."""
+    try:
+        seen = _seen(found, plan, looking)
+    except CannotCalibrate:  # which will be said of the pictures themselves
+        return _evenly(range(len(found)), plan.frames), {}
+    shown = {name: {place for one in each.values() for place in one.places} for name, each in seen.items()}
+    counts = {name: len(places) for name, places in shown.items()}
+    try:
+        return list(_most_telling(seen, plan)), counts
+    except CannotCalibrate:
+        return _evenly(sorted(set().union(*shown.values())), plan.frames), counts
+
+
+def _seen(found: Sequence[FilmedMoment], plan: FrameChoice, looking: Step | None) -> dict[str, dict[str, Detections]]:
+    """What each camera saw of each board; raises CannotCalibrate for a camera that saw none."""
     names = dict.fromkeys(name for each in found for name in each.pictures)
-    total, begun = sum(len(each.pictures) for each in found), 0
-    seen: dict[str, Detections] = {}
+    total, begun = len(plan.boards) * sum(len(each.pictures) for each in found), 0
+    seen: dict[str, dict[str, Detections]] = {name: {} for name in names}
     for name in names:
         places = [place for place, each in enumerate(found) if name in each.pictures]
         paths = [found[place].pictures[name] for place in places]
-        progress = None if looking is None else _from(begun, total, looking)
-        try:
-            each = detect(paths, plan.board, progress=progress, **(plan.search or {}))
-        except CannotCalibrate:  # which will be said of the pictures themselves
-            return _evenly(range(len(found)), plan.frames), {}
-        seen[name] = replace(each, places=tuple(places[place] for place in each.places))
-        begun += len(paths)
-    counts = {name: len(each.places) for name, each in seen.items()}
-    try:
-        chosen = most_telling(seen, plan.board, plan.model, plan.frames, held=plan.held, fixed=plan.fixed)
-    except CannotCalibrate:
-        return _evenly(sorted({place for each in seen.values() for place in each.places}), plan.frames), counts
-    return list(chosen), counts
+        for called, board in plan.boards.items():
+            progress = None if looking is None else _from(begun, total, looking)
+            begun += len(paths)
+            try:
+                each = detect(paths, board, progress=progress, **(plan.search or {}))
+            except NoBoard:
+                continue
+            seen[name][called] = replace(each, places=tuple(places[place] for place in each.places))
+        if not seen[name]:
+            raise CannotCalibrate(f"{name} shows no board")
+    return seen
+
+
+def _most_telling(seen: Mapping[str, Mapping[str, Detections]], plan: FrameChoice) -> tuple[int, ...]:
+    if len(plan.boards) > 1:
+        how = {"held": plan.held, "fixed": plan.fixed, **(plan.fixture or {})}
+        return most_telling_of_boards(seen, plan.boards, plan.model, plan.frames, **how)
+    ((called, board),) = plan.boards.items()
+    alone = {name: each[called] for name, each in seen.items()}
+    return most_telling(alone, board, plan.model, plan.frames, held=plan.held, fixed=plan.fixed)
 
 
 def _from(begun: int, total: int, looking: Step) -> Step:
