@@ -66,14 +66,16 @@ def snapshot(
     rng: np.random.Generator,
     noise: float = 2.0,
     margin: float = MARGIN,
+    texels: int = TEXELS,
 ) -> NDArray[np.uint8]:
     """The board at a pose, uint8 grey (height, width), a little out of focus, with noise of this σ in grey levels.
 
     With one pose for each row, each row is read at its own, as a rolling shutter does it. With MARGIN around it, an
     edge of a square is a lopsided ramp over two texels, and corners are found up to 0.03 px beside it; with SHARP not.
+    So it is where all edges are whole numbers of `texels` apart, of which there are so many along `square_size`.
     """
-    across, down = _seen(camera, board, cam_from_board, margin)
-    paper = (BLACK + (WHITE - BLACK) * whiteness(board, TEXELS, margin)).astype(np.float32)
+    across, down = _seen(camera, board, cam_from_board, margin, texels)
+    paper = (BLACK + (WHITE - BLACK) * whiteness(board, texels, margin)).astype(np.float32)
     samples = cv2.remap(paper, across, down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=BEHIND)
     grid = camera.intrinsics
     picture = cv2.resize(samples, (grid.width, grid.height), interpolation=cv2.INTER_AREA)  # the mean of each pixel's
@@ -88,19 +90,22 @@ def together(
     rng: np.random.Generator,
     noise: float = 2.0,
     margin: float = MARGIN,
+    texels: int = TEXELS,
 ) -> NDArray[np.uint8]:
     """Several boards in one sRGB picture, uint8 grey (height, width); a later one covers what is behind its paper."""
     whole = np.full((camera.intrinsics.height, camera.intrinsics.width), BEHIND)
     for board, pose in zip(boards, cam_from_boards, strict=True):
-        one = snapshot(camera, board, pose, rng, 0.0, margin).astype(float)
+        one = snapshot(camera, board, pose, rng, 0.0, margin, texels).astype(float)
         whole = np.where(np.abs(one - BEHIND) > PAPER, one, whole)
     encoded = 255 * to_encoded(whole / 255)
     return np.clip(np.rint(encoded + rng.normal(0, noise, whole.shape)), 0, 255).astype(np.uint8)
 
 
-def _seen(camera: Camera, board: Board, cam_from_board: RigidTransform, margin: float) -> tuple[Single, Single]:
+def _seen(
+    camera: Camera, board: Board, cam_from_board: RigidTransform, margin: float, texels: int
+) -> tuple[Single, Single]:
     """The column and the row of the paper that each sample sees, float32 (FINER * height, FINER * width) each."""
-    texel = board.square_size / TEXELS
+    texel = board.square_size / texels
     left, top = (edge - margin * board.square_size for edge in board.area[:2])
     board_from_cam = (cam_from_board.inv().as_matrix()[..., :3, :] / texel).astype(np.float32)  # in texels
     turn, start = board_from_cam[..., :3], board_from_cam[..., 3]

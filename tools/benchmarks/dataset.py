@@ -40,6 +40,7 @@ BOARDS = {
     "AprilGrid": Board.aprilgrid(4, 3, 0.04, 0.3),
     "markers": Board.marker_grid(4, 3, 0.04, "DICT_4X4_50"),
 }
+TEXELS = {"AprilGrid": (20 / 39, 39)}  # the margin, and texels along a tag and its gap, which are 13 cells
 FINDERS = {"chessboard, sectors": "sectors"}  # the others are found as `camviz dataset` does
 BOARDS["chessboard, sectors"] = BOARDS["chessboard"]
 SEED, VIEWS, TILT_DEG, NOISE = 95_000, 10, (15, 40), 3.0
@@ -69,8 +70,8 @@ def main(kinds: list[str], seeds: int) -> None:
 def photographed(kind: str, rng: np.random.Generator) -> tuple[Detections, RigidTransform]:
     """What is found in photographs of a board, and its true poses in all of them."""
     board, grid = BOARDS[kind], CAMERA.intrinsics
-    truth = spread_boards(rng, (CAMERA,), board, VIEWS, TILT_DEG)
-    pictures = [together(CAMERA, [board], RigidTransform.concatenate([pose]), rng, NOISE, SHARP) for pose in truth]
+    truth, drawn = spread_boards(rng, (CAMERA,), board, VIEWS, TILT_DEG), TEXELS.get(kind, (SHARP,))
+    pictures = [together(CAMERA, [board], RigidTransform.concatenate([pose]), rng, NOISE, *drawn) for pose in truth]
     corners = [find_corners(picture, board, FINDERS.get(kind, "saddles")) for picture in pictures]
     places = [view for view, seen in enumerate(corners) if seen is not None]
     names = tuple(f"{view}.png" for view in places)
