@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from camviz.views.patience import Patience
 from camviz_school.course.checks import Exercise, Misconception
 from camviz_school.course.trials import Arguments, Trial, run
 
@@ -36,21 +37,23 @@ class WrongAnswer:
 
 def wrong_answers(exercise: Exercise) -> list[WrongAnswer]:
     """The typical wrong answers of an exercise, the dearest first."""
-    arguments = _telling_case(exercise)
-    found = [_marked(exercise, one, arguments) for one in exercise.misconceptions]
+    with Patience() as patience:  # one thread for all calls: each of its own takes ten times as long as the call
+        arguments = _telling_case(exercise, patience)
+        found = [_marked(exercise, one, arguments, patience) for one in exercise.misconceptions]
     return sorted(found, key=lambda one: -one.keeps)
 
 
 def example(exercise: Exercise) -> tuple[str, str] | None:
     """A call, and what the right answer gives for it; None where no case fits on a line."""
-    arguments = _telling_case(exercise)
+    with Patience() as patience:
+        arguments = _telling_case(exercise, patience)
     return (exercise.call(arguments), _numbers(exercise.answer(arguments))) if arguments else None
 
 
-def _marked(exercise: Exercise, known: Misconception, arguments: Arguments | None) -> WrongAnswer:
+def _marked(exercise: Exercise, known: Misconception, arguments: Arguments | None, patience: Patience) -> WrongAnswer:
     cases = islice(exercise.cases(np.random.default_rng(0)), MOST_CASES)
-    keeps = kept(exercise, [run(exercise, known.function, one) for one in cases])
-    gives = _numbers(run(exercise, known.function, arguments).actual) if arguments else ""
+    keeps = kept(exercise, [run(exercise, known.function, one, patience) for one in cases])
+    gives = _numbers(run(exercise, known.function, arguments, patience).actual) if arguments else ""
     return WrongAnswer(known.function.__name__.replace("_", " "), known.explanation, keeps, gives)
 
 
@@ -88,23 +91,27 @@ def _one_slip(exercise: Exercise, trials: list[Trial]) -> bool:
     return turned or bool(scaled)
 
 
-def _telling_case(exercise: Exercise) -> Arguments | None:
+def _telling_case(exercise: Exercise, patience: Patience) -> Arguments | None:
     """Of the cases that fit on a line, the one in which most wrong answers differ from the right one."""
     cases = islice(exercise.cases(np.random.default_rng(0)), MOST_CASES)
-    short = [one for one in (*exercise.shown, *(tuple(map(_rounded, case)) for case in cases)) if _fits(exercise, one)]
+    short = [
+        one
+        for one in (*exercise.shown, *(tuple(map(_rounded, case)) for case in cases))
+        if _fits(exercise, one, patience)
+    ]
 
     def told_apart(arguments: Arguments) -> int:
-        return sum(not run(exercise, known.function, arguments).fits for known in exercise.misconceptions)
+        return sum(not run(exercise, known.function, arguments, patience).fits for known in exercise.misconceptions)
 
     return max(short, key=told_apart, default=None)
 
 
-def _fits(exercise: Exercise, arguments: Arguments) -> bool:
+def _fits(exercise: Exercise, arguments: Arguments, patience: Patience) -> bool:
     """True for a call that fits on a line and has numbers for an answer, rounded arguments or not."""
     call = exercise.call(arguments)
     if "<array" in call or len(call) > LONGEST_CALL:
         return False
-    trial = run(exercise, exercise.reference, arguments)
+    trial = run(exercise, exercise.reference, arguments, patience)
     numbers = np.concatenate([part.ravel() for part in trial.expected])
     return bool(np.isfinite(numbers).all()) and 0 < len(_numbers(trial.expected)) <= LONGEST_CALL
 
