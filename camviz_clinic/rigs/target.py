@@ -58,7 +58,7 @@ class Target(Board):
         size = max(part.square_size for part in parts)
         return cls(count, 1, size, names=tuple(names), parts=tuple(parts), places=places)
 
-    @property
+    @cached_property
     def corners(self) -> Array:
         """The points (points, 3) of all boards in the target's frame, in metres."""
         return np.concatenate([self.places[i].apply(part.corners) for i, part in enumerate(self.parts)])
