@@ -48,7 +48,8 @@ def drawn_by_reader(notebook: Notebook, *, given: bool = False) -> dict[str, str
         stub = "stub" in cell.metadata.get("tags", [])
         exercise = notebooks.exercise_of(cell).partition(".")[2] if stub and (given or is_open(cell)) else ""
         for statement in _in_order(tree.body):
-            used = [written[name] for name in written if name in _loaded(statement)]
+            loaded = _loaded(statement)
+            used = [written[name] for name in written if name in loaded]
             if used and not stub:
                 found[cell.id] = used[-1]
             for name in _stored(statement):
