@@ -10,6 +10,7 @@ from typing import Any
 from camviz_school.course import notebooks, questions
 from camviz_school.course.notebooks import Cell, Notebook
 
+_COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 _ASKED = re.compile(r"^(ask|quiz)\((.*)\)\s*$", re.MULTILINE)
 
 
@@ -79,7 +80,9 @@ def _stored(code: ast.AST) -> set[str]:
     """The names that code gives values, except those that live in a function or in one comprehension only."""
     if isinstance(code, ast.FunctionDef):
         return {code.name}
-    inner = set().union(*map(_stored, ast.iter_child_nodes(code))) - _bound(code, ast.comprehension)
+    inner = set().union(*map(_stored, ast.iter_child_nodes(code)))
+    if isinstance(code, _COMPREHENSIONS):
+        inner -= _bound(code, ast.comprehension)
     return inner | ({code.id} if isinstance(code, ast.Name) and isinstance(code.ctx, ast.Store) else set())
 
 
