@@ -1,6 +1,7 @@
 """The clinic's report: every finding leads to its view, everything is inside one file, and pictures are linked."""
 
 import asyncio
+import io
 import re
 from dataclasses import replace
 from functools import cache
@@ -10,11 +11,14 @@ import cv2
 import numpy as np
 import pytest
 from calibrations import bare, pair, sick, single
+from PIL import Image
 
 import camviz_clinic
+from camviz.draw.picture import jpeg, png
 from camviz_clinic.checks import Inspection, inspect, inspect_file, kinds
 from camviz_clinic.report.inspection import MOST_VIEWS, accused, report, worst_views, write_report
 from camviz_clinic.report.notebook import LiveInspection
+from camviz_clinic.report.pictures import QUALITY, webp
 from camviz_clinic.views.catalogue import ALIASES, VIEWS, Case
 
 VOID = {"meta", "br", "img", "link", "input", "hr"}
@@ -119,7 +123,37 @@ def test_photographs_are_embedded_small(tmp_path):
     assert len(text) < 5e6
     assert "is not at hand" not in text
     assert "The picture is not at hand; name its folder: --images FOLDER" in reported("healthy")
-    assert text.count("data:image/jpeg") >= 10
+    assert text.count("data:image/webp") >= 10
+
+
+def test_photographs_keep_their_edges_and_maps_every_pixel():
+    """A noisy JPEG keeps its slopes within 3 %. What is transparent in a map has no colour to keep."""
+    rng = np.random.default_rng(0)
+    grey = cv2.GaussianBlur(rng.integers(0, 255, (240, 320), np.uint8), (0, 0), 2)
+    before = jpeg(grey)
+    after = webp(before, QUALITY)
+    assert after.startswith(b"RIFF")
+    assert len(after) < 0.8 * len(before)
+    assert edges(after) == pytest.approx(edges(before), rel=0.03)
+    map_ = rng.integers(0, 2, (12, 16, 4), np.uint8) * 200
+    shown = np.array(Image.open(io.BytesIO(webp(png(map_), QUALITY))))
+    np.testing.assert_array_equal(shown[..., 3], map_[..., 3])
+    np.testing.assert_array_equal(shown[map_[..., 3] > 0], map_[map_[..., 3] > 0])
+
+
+def edges(data: bytes) -> float:
+    """The mean slope of a grey photograph, in grey levels a pixel."""
+    grey = np.array(Image.open(io.BytesIO(data)).convert("L"), float)
+    return float(np.hypot(*np.gradient(grey)).mean())
+
+
+def test_every_tile_knows_its_shape_before_it_is_drawn(page):
+    _, text, _ = page
+    tiles = re.findall(
+        r'<svg [^>]*camviz-fitted[^>]* viewBox="\S+ \S+ (\S+) (\S+)" style="aspect-ratio:(.*?)/(.*?)"', text
+    )
+    assert len(tiles) == text.count('class="camviz-svg camviz-fitted"') > 0
+    assert all(tile[:2] == tile[2:] for tile in tiles)
 
 
 def test_a_board_in_space_is_called_by_the_number_of_its_picture():

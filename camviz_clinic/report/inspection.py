@@ -14,7 +14,7 @@ import numpy as np
 from camviz.cameras import transform
 from camviz.draw import svg
 from camviz.draw.items import Face, Item, Label, Line
-from camviz.draw.page import document, figure
+from camviz.draw.page import document
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
 from camviz.draw.space import OrbitCamera, axes_triad, camera_body, draw_space, space_panel
@@ -24,6 +24,7 @@ from camviz_clinic.checks.inspection import Inspection
 from camviz_clinic.checks.registry import Finding
 from camviz_clinic.checks.summary import MOST_CAMERAS
 from camviz_clinic.report.findings import findings_html, verdict_html
+from camviz_clinic.report.pictures import embedded, figure
 from camviz_clinic.views.board_poses import BoardPosesView
 from camviz_clinic.views.catalogue import ALIASES, VIEWS, Case, Entry, title_of
 from camviz_clinic.views.chessboard import outline
@@ -150,7 +151,7 @@ def _linked(case: Case, name: str, headed: bool, named: Sequence[int]) -> str:
     view = ResidualsView.about(seen)
     links = {i: f"#{_id(name)}-{i + 1}" for i in shown}
     panel = bars_panel(seen)
-    bars = Picture.whole(
+    drawn = Picture.whole(
         view.bars_panel(panel, links=links), 960, 206,
         f"Error of every view of {name}", view.description().split(" Shown:")[0],
     )  # fmt: skip
@@ -158,11 +159,12 @@ def _linked(case: Case, name: str, headed: bool, named: Sequence[int]) -> str:
     few = which if len(shown) < seen.shown.sum() else ""
     said = f'{few}<p class="live-only">Choose a bar, or a board in space, or press the arrow keys on one.</p>'
     figures = "".join(_view_figure(view.but(view=i + 1), name, i) for i in shown)
+    bars, boards = figure("", drawn), figure("", _boards(seen, name, links))
     heading = f"<h3>{escape(name)}</h3>" if headed else ""
     return (
-        f'<div class="linked" data-first="{first + 1}">{heading}{said}{_picture(bars)}'
+        f'<div class="linked" data-first="{first + 1}">{heading}{said}{bars}'
         '<div class="side-by-side"><div '
-        f'class="pictures">{figures}</div>{_picture(_boards(seen, name, links))}</div></div>'
+        f'class="pictures">{figures}</div>{boards}</div></div>'
     )
 
 
@@ -194,7 +196,7 @@ def _view_figure(view: ResidualsView, name: str, i: int) -> str:
         described,
         attached,
     )
-    return f'<figure id="{_id(name)}-{i + 1}" data-view="{i + 1}" tabindex="-1">{picture.embedded()}</figure>'
+    return f'<figure id="{_id(name)}-{i + 1}" data-view="{i + 1}" tabindex="-1">{embedded(picture)}</figure>'
 
 
 def _boards(seen: Observations, name: str, links: Mapping[int, str]) -> Picture:
@@ -233,10 +235,6 @@ def _boards(seen: Observations, name: str, links: Mapping[int, str]) -> Picture:
         f"{np.nanmax(seen.distances):.2g} m before the camera."
     )
     return Picture.whole(body, 490, 514, "Boards in space", told)
-
-
-def _picture(picture: Picture) -> str:
-    return f"<figure>{picture.embedded()}</figure>"
 
 
 def _id(name: str) -> str:

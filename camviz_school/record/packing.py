@@ -7,7 +7,6 @@ kept once, and the text is a list of runs of pieces. What is left, the server's 
 from __future__ import annotations
 
 import gzip
-import io
 import json
 import re
 from collections.abc import Iterable, Mapping
@@ -16,7 +15,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from PIL import Image
+from camviz_clinic.report import pictures
 
 SHORT = 100  # characters: a shorter text is stored as it is
 QUALITY = 75  # of WebP, for photographs; drawings (PNG) keep every pixel
@@ -122,9 +121,7 @@ class Pack:
 
 def webp(data: bytes) -> bytes:
     """A JPEG or PNG as WebP; what was a PNG keeps every pixel."""
-    with Image.open(io.BytesIO(data)) as image, io.BytesIO() as made:
-        image.save(made, "WEBP", quality=QUALITY, method=_EFFORT, lossless=image.format == "PNG")
-        return made.getvalue()
+    return pictures.webp(data, QUALITY, _EFFORT)
 
 
 def hashed(data: bytes) -> str:

@@ -127,3 +127,23 @@ def test_each_camera_of_a_pair_has_its_own_choice(browser, written):
     assert right.get_attribute("data-chosen") != "3" or right.get_attribute("data-first") == "3"
     assert complaints == []
     page.close()
+
+
+@pytest.mark.parametrize("width", [375, 1440])
+def test_tiles_away_from_the_screen_wait_in_the_room_that_they_take(browser, written, width):
+    """Every tile, and the page, is as tall before it is drawn as when all are drawn; on paper all are drawn."""
+    page, complaints, _ = opened(browser, written / "pair.html")
+    page.set_viewport_size({"width": width, "height": 800})
+    waiting = """[...document.querySelectorAll(".camviz-fitted text")].filter(
+        (one) => !one.checkVisibility({ contentVisibilityAuto: true })).length"""
+    heights = """[document.documentElement, ...document.querySelectorAll(".camviz-fitted")].map(
+        (one) => one.getBoundingClientRect().height)"""
+    assert page.evaluate(waiting) > 100
+    before = page.evaluate(heights)
+    page.emulate_media(media="print")
+    assert page.evaluate("getComputedStyle(document.querySelector('.camviz-fitted')).contentVisibility") == "visible"
+    page.emulate_media(media="screen")
+    page.add_style_tag(content=".camviz-fitted { content-visibility: visible !important; }")
+    np.testing.assert_allclose(page.evaluate(heights), before, atol=0.02)
+    assert complaints == []
+    page.close()

@@ -211,6 +211,30 @@ def test_nothing_jumps_on_a_phone_while_the_first_picture_comes_to_life(browser:
     page.close()
 
 
+@pytest.mark.parametrize("width", [375, 1440])
+def test_a_pane_is_as_high_before_it_comes_to_life_as_after(browser: Browser, address: str, width: int) -> None:
+    """The panes of lesson 16 in order: first no recording comes, then all do. Some have words among their pictures."""
+    waiting = pane_heights(browser, f"{address}/lessons/16_clinic.html", width, live=False)
+    assert len(waiting) > 10
+    assert pane_heights(browser, f"{address}/lessons/16_clinic.html", width, live=True) == pytest.approx(waiting, abs=1)
+
+
+def pane_heights(browser: Browser, lesson: str, width: int, *, live: bool) -> list[float]:
+    """The heights of a lesson's panes that are not folded away, in CSS pixels: alive, or before they are."""
+    page = new_page(browser, viewport={"width": width, "height": 900})
+    if not live:
+        page.route("**/_recordings/*.js", lambda route: route.abort())
+    page.goto(lesson)
+    heights = []
+    for pane in page.locator(".camviz-recorded:visible").all():
+        pane.scroll_into_view_if_needed()
+        if live:
+            page.wait_for_function("(one) => one.dataset.live === 'true'", arg=pane.element_handle())
+        heights.append(pane.bounding_box()["height"])
+    page.close()
+    return heights
+
+
 def test_a_link_to_any_page_shows_a_picture_of_known_size(page: Page, address: str) -> None:
     for way in ("index", "learn", LESSON, "docs/glossary"):
         page.goto(f"{address}/{way}.html")
