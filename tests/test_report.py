@@ -156,6 +156,11 @@ def test_every_tile_knows_its_shape_before_it_is_drawn(page):
     assert all(tile[:2] == tile[2:] for tile in tiles)
 
 
+def test_what_scrolls_on_a_phone_can_be_scrolled_by_keys():
+    text = reported("healthy")
+    assert 0 < text.count('camviz-scrolled"') == text.count('camviz-scrolled" tabindex="0"')
+
+
 def test_a_board_in_space_is_called_by_the_number_of_its_picture():
     few = single(views=10)
     names = tuple(f"left{i:02}.jpg" for i in (*range(1, 10), 11))
