@@ -1,16 +1,20 @@
 """Hand and eye: X against simulated truth and against OpenCV 4's solution, and a σ that holds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from camviz.cameras import Camera
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.motions import Motions, Turning
 from camviz_clinic.calibration.motions_solving import park
 from camviz_clinic.checks.rig import lone_poses
 from camviz_clinic.handeye import PoseError, hand_eye, hand_eye_from_corners
-from camviz_clinic.handeye.adjusting import STRAY, Adjusted, Pixels, far_off
+from camviz_clinic.handeye.adjusting import STRAY, Adjusted, Noise, Pixels, far_off, robust
 from camviz_clinic.handeye.solving import corner_noise
 from camviz_clinic.handeye.virtual import about_one_axis, cell, strayed
+from camviz_clinic.handeye.weighing import BoardPoses, weighed
 
 BOTH = pytest.mark.parametrize("eye_to_hand", [False, True], ids=["eye in hand", "eye to hand"])
 PARK = {
@@ -159,6 +163,88 @@ def test_a_picture_without_the_board_takes_its_pose_with_it():
     assert np.flatnonzero(~found.used).tolist() == [3]
     assert np.isnan(found.displacements[3])
     assert np.linalg.norm(off(found, true)[3:]) < 0.002
+
+
+def seen_badly_along_the_optical_axis(rng, true, turn=0.002, across=0.0005, along=0.006):
+    """The boards of a cell with errors of these sizes in turn and place."""
+    other_from_mount = true.base_from_hand.inv() if true.eye_to_hand else true.base_from_hand
+    boards = true.X.inv() * other_from_mount.inv() * true.Z
+    turned = boards.rotation * Rotation.from_rotvec(rng.normal(0, turn, (len(boards), 3)))
+    shift = rng.normal(0, 1, (len(boards), 3)) * [across, across, along]
+    return RigidTransform.from_components(boards.translation + shift, turned)
+
+
+@BOTH
+def test_poses_of_a_board_whose_distance_is_seen_badly_give_x_by_their_directions(eye_to_hand):
+    """X is nearer than where all counts alike, in 12 cells, and the sizes of turn and distance are found."""
+    plain, learnt, sizes, z = [], [], [], []
+    for seed in range(12):
+        rng = np.random.default_rng([321, seed])
+        true = cell(rng, 20, eye_to_hand, robot_mm=0.05, robot_deg=0.005)
+        boards = seen_badly_along_the_optical_axis(rng, true)
+        found = hand_eye(true.base_from_hand, boards, eye_to_hand=eye_to_hand)
+        alike = robust(found.motions, found.mount_from_cam, found.other_from_board)
+        alike = replace(alike, weights=None).refined()
+        plain.append(np.linalg.norm(alike.X.translation - true.X.translation))
+        learnt.append(np.linalg.norm(off(found, true)[3:]))
+        measured = found.adjusted.measured
+        assert isinstance(measured, BoardPoses)
+        sizes.append([measured.turn, measured.along])
+        z.append(off(found, true)[3:] / found.translation_sigma)
+    assert np.median(learnt) < 0.7 * np.median(plain)
+    assert np.median(sizes, axis=0) == pytest.approx([0.002, 0.006], rel=0.2)  # what lies across may be the robot's
+    assert 0.6 < np.sqrt(np.mean(np.square(z))) < 1.5
+
+
+def test_where_all_errors_are_alike_weighing_them_changes_next_to_nothing():
+    """Sizes that are learnt cost little where there is nothing to learn."""
+    plain, learnt = [], []
+    for seed in range(12):
+        rng = np.random.default_rng([322, seed])
+        true = cell(rng, 15, robot_mm=1e-3, robot_deg=1e-4)
+        boards = seen_badly_along_the_optical_axis(rng, true, 0.004, 0.002, 0.002)
+        found = hand_eye(true.base_from_hand, boards)
+        alike = robust(found.motions, found.mount_from_cam, found.other_from_board)
+        even = replace(alike, weights=None).refined()
+        plain.append(np.linalg.norm(even.X.translation - true.X.translation))
+        learnt.append(np.linalg.norm(weighed(even, slice(0, 6)).X.translation - true.X.translation))
+    assert np.sqrt(np.mean(np.square(learnt))) < 1.1 * np.sqrt(np.mean(np.square(plain)))
+
+
+@BOTH
+@pytest.mark.parametrize("factor", [0.14, 2.0])
+def test_lengths_in_any_unit_are_brought_to_the_robots(eye_to_hand, factor):
+    """Boards whose distances are multiplied by a factor give X in the robot's unit, and the factor, within 4 σ."""
+    true = cell(np.random.default_rng(77), 20, eye_to_hand)
+    boards = lone_poses(true.camera, true.board, true.pixels)
+    longer = RigidTransform.from_components(factor * boards.translation, boards.rotation)
+    found = hand_eye(true.base_from_hand, longer, eye_to_hand=eye_to_hand, any_scale=True)
+    assert found.scale == pytest.approx(1 / factor, rel=5e-3)
+    assert (np.abs(off(found, true)[3:]) < 4 * found.translation_sigma).all()
+    assert found.translation_sigma.max() < 3e-3
+    given = hand_eye(true.base_from_hand, longer, eye_to_hand=eye_to_hand)
+    assert given.scale == 1
+    assert np.linalg.norm(off(given, true)[3:]) > 0.1
+
+
+def test_a_camera_without_its_distortion_is_not_blamed_on_the_robot():
+    """Corners of pictures that were not solved from lie nearer than where all but their own scatter is the robot's."""
+    learnt, blamed = [], []
+    for seed in range(5):
+        true = cell(np.random.default_rng([411, seed]), 24, robot_mm=0.05, robot_deg=0.005)
+        undistorted = Camera(true.camera.intrinsics)
+        found = hand_eye_from_corners(true.base_from_hand[:12], true.pixels[:12], undistorted, true.board).adjusted
+        own = corner_noise(found.measured, found.motions.cam_from_board)
+        size = np.sqrt(np.mean(found.displacements**2) / 6)
+        robots = replace(found, noise=Noise(own, size / found.motions.lever, size, found.noise.side)).refined()
+        boards = lone_poses(undistorted, true.board, true.pixels[12:])
+        motions = Motions.of(true.base_from_hand[12:], boards, False)
+        new = Pixels(undistorted, true.board.corners, true.pixels[12:])
+        for solution, errors in ((found, learnt), (robots, blamed)):
+            there = replace(solution, noise=None, motions=motions, measured=new)
+            errors.append(np.sqrt(np.mean(there.residuals**2)))
+        assert found.noise.px > 3 * own
+    assert np.median(learnt) < 0.6 * np.median(blamed)
 
 
 def test_turns_about_one_axis_leave_x_unknown_along_it_and_nowhere_else():

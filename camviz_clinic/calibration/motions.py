@@ -76,6 +76,11 @@ class Motions:
         A = self.other_from_mount
         return replace(self, other_from_mount=RigidTransform.from_components(factor * A.translation, A.rotation))
 
+    def resized(self, factor: float) -> Self:
+        """With the camera's lengths multiplied by a factor."""
+        B = self.cam_from_board
+        return replace(self, cam_from_board=RigidTransform.from_components(factor * B.translation, B.rotation))
+
     @cached_property
     def A(self) -> Array:
         """other_from_mount as matrices (poses, 4, 4)."""

@@ -22,8 +22,6 @@ MOST_STEPS = 60
 SETTLED = 1e-12  # of the sum of squares, what a step must still promise to take off
 UNKNOWNS = 12
 STRAY = 5.0  # times the median displacement: of six Gaussian errors of one size a pose reaches 2.5 once in 100,000
-ROUNDS = 40
-LEARNT = 1e-3  # of the robot's errors: a smaller change ends the rounds
 
 
 class BoardMeasurements(Protocol):
@@ -95,6 +93,9 @@ class Pixels:
 class Noise:
     """Standard deviations: of a corner's coordinate in pixels, and of the robot's poses about and along each axis.
 
+    `px` is how far corners scatter from picture to picture: as in one picture, or more where camera or board are not
+    quite as told.
+
     `side` are the columns of X's twist where the mount is the hand, of Z's where the board is on the hand.
     """
 
@@ -150,7 +151,7 @@ class Adjusted:
         plain = np.sum(self.residuals**2, axis=(1, 2))
         if self.noise is None:
             return plain
-        explained = np.einsum("pa,pa->p", self._plain[1][:, self.noise.side], self.robot_errors)
+        explained = np.einsum("pa,pa->p", self.normals[1][:, self.noise.side], self.robot_errors)
         return (plain - explained) / self.noise.px**2
 
     @property
@@ -174,7 +175,7 @@ class Adjusted:
         return jacobian.reshape(len(self.motions), -1, jacobian.shape[-1])
 
     @cached_property
-    def _plain(self) -> tuple[Array, Array]:
+    def normals(self) -> tuple[Array, Array]:
         """JᵀJ (poses, unknowns, unknowns) and Jᵀr (poses, unknowns) of each pose, with its weight."""
         weights = np.ones(len(self.motions)) if self.weights is None else self.weights
         transposed = weights[:, None, None] * self.jacobian.swapaxes(1, 2)
@@ -186,18 +187,18 @@ class Adjusted:
         """(GᵀG + px² S⁻¹)⁻¹ of each pose, (poses, 6, 6)."""
         assert self.noise is not None
         side = self.noise.side
-        return inverse(self._plain[0][:, side, side] + self.noise.information)
+        return inverse(self.normals[0][:, side, side] + self.noise.information)
 
     @cached_property
     def robot_errors(self) -> Array:
         """The most likely twists (poses, 6) of the robot's errors in the hand's frame, in radians and metres."""
         assert self.noise is not None
-        return np.einsum("pab,pb->pa", self._spread, self._plain[1][:, self.noise.side])
+        return np.einsum("pab,pb->pa", self._spread, self.normals[1][:, self.noise.side])
 
     @cached_property
     def blocks(self) -> Array:
         """JᵀC⁻¹J of each pose (poses, unknowns, unknowns)."""
-        N = self._plain[0]
+        N = self.normals[0]
         if self.noise is None:
             return N
         side = self.noise.side
@@ -206,30 +207,11 @@ class Adjusted:
     @cached_property
     def gradients(self) -> Array:
         """JᵀC⁻¹r of each pose (poses, unknowns)."""
-        N, g = self._plain
+        N, g = self.normals
         if self.noise is None:
             return g
         side = self.noise.side
         return (g - np.einsum("pab,pb->pa", N[:, :, side], self.robot_errors)) / self.noise.px**2
-
-    def with_noise_learnt(self, px: float, side: slice) -> Adjusted:
-        """At the least sum of squares with the size of the robot's errors that is most likely, to begin with px alone.
-
-        Source: Dempster, Laird & Rubin, *Maximum likelihood from incomplete data via the EM algorithm*, JRSS B 39
-        (1977), with the sum divided by the degrees of freedom.
-        """
-        lever = self.motions.lever
-        size = max(float(np.sqrt(np.mean(self.displacements**2) / 6)), 1e-7)
-        here = replace(self, noise=Noise(px, size / lever, size, side)).refined()
-        free = 6 * len(self.motions) / max(6 * len(self.motions) - UNKNOWNS, 1)
-        for _ in range(ROUNDS):
-            second = here.robot_errors**2 + px**2 * np.einsum("paa->pa", here._spread)
-            turn, shift = (float(np.sqrt(free * second[:, part].mean())) for part in (slice(3), slice(3, 6)))
-            before = here.noise
-            here = replace(here, noise=Noise(px, max(turn, 1e-9), max(shift, 1e-9), side)).refined()
-            if before and abs(turn / before.turn - 1) + abs(shift / before.shift - 1) < LEARNT:
-                break
-        return here
 
     def refined(self) -> Adjusted:
         """At the nearest least sum of squares (Levenberg–Marquardt); `also` stays where it is."""
@@ -276,6 +258,18 @@ class Adjusted:
         unknowns = self.blocks.shape[-1]
         nothing = np.zeros((unknowns, unknowns))
         return ByView(self.blocks, self.gradients, nothing, np.zeros(unknowns)).covariance(sigma=1.0)
+
+    @property
+    def robot_lengths(self) -> Array:
+        """The twists (poses, 6) of the mount, for `also`, where the robot's lengths grow: by 1 to twice as long."""
+        A = self.motions.other_from_mount
+        return np.concatenate([np.zeros((len(A), 3)), A.rotation.inv().apply(A.translation)], axis=-1)
+
+    @property
+    def scale(self) -> tuple[float, float]:
+        """The factor by which the robot's lengths would have to be multiplied, and its σ, solved for beside X and Z."""
+        there = replace(self, also=(self.robot_lengths,))
+        return 1 + float(there.step[UNKNOWNS]), float(np.sqrt(there.covariance[UNKNOWNS, UNKNOWNS]))
 
     @property
     def model_covariance(self) -> Array:

@@ -217,7 +217,7 @@ class PosedPictures:
         )
 
     def _scale(self) -> Iterator[Finding]:
-        scale, sigma = scale_of(self.result)
+        scale, sigma = self.result.adjusted.scale
         if is_off(scale, sigma):
             side = 1000 * self.board.square_size
             yield Finding(
@@ -296,16 +296,6 @@ def _place_covariance(result: HandEye) -> Array:
 
     carried = twist_jacobian(np.asarray(result.mount_from_cam.translation))
     return np.asarray(carried @ result.covariance[:6, :6] @ carried.T)
-
-
-def scale_of(result: HandEye) -> tuple[float, float]:
-    """The factor by which the robot's lengths would have to be multiplied, and its σ, solved for beside X and Z."""
-    from dataclasses import replace
-
-    A = result.motions.other_from_mount
-    along = np.concatenate([np.zeros((len(A), 3)), A.rotation.inv().apply(A.translation)], axis=-1)
-    there = replace(result.adjusted, also=(along,))
-    return 1 + float(there.step[12]), float(np.sqrt(there.covariance[12, 12]))
 
 
 def is_off(scale: float, sigma: float) -> bool:

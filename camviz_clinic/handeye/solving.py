@@ -17,10 +17,13 @@ from camviz_clinic.calibration.motions_solving import start
 from camviz_clinic.calibration.problem import LEAST_CORNERS
 from camviz_clinic.calibration.types import Board
 from camviz_clinic.checks.rig import lone_poses
-from camviz_clinic.handeye.adjusting import Adjusted, Noise, Pixels, far_off, robust
+from camviz_clinic.handeye.adjusting import UNKNOWNS, Adjusted, Noise, Pixels, far_off, robust
+from camviz_clinic.handeye.weighing import weighed, weighed_in_pixels
 
 MOST_STRAY = 0.2  # of the poses
 UNKNOWN_DEG = 1.0  # turned less about every second axis, a direction of X's translation is not known
+MOST_RESIZED = 10
+SETTLED = 0.01  # σ: a smaller step of the scale ends the rounds
 NOISE_TURNS = 3.0  # nor where the turn is less than so many times the robot's own errors
 
 
@@ -36,6 +39,7 @@ class HandEye:
         adjusted: The solution over the poses that were used.
         used: (poses,) of bool, true for a pose that does not contradict the others.
         displacements: (poses,), metres by which each pose's board is off, turns counted at the board's distance.
+        scale: By what the camera's lengths were multiplied to be those of the robot: 1 unless it was asked for.
 
     >>> from camviz_clinic.handeye.virtual import cell
     >>> true = cell(np.random.default_rng(2), poses=12)
@@ -48,6 +52,7 @@ class HandEye:
     adjusted: Adjusted
     used: Mask
     displacements: Array
+    scale: float = 1.0
 
     @property
     def mount_from_cam(self) -> RigidTransform:
@@ -65,7 +70,7 @@ class HandEye:
 
         Returns: (12, 12), each twist (ω, τ) in the frame it leads to, in radians and metres.
         """
-        return self.adjusted.covariance
+        return self.adjusted.covariance[:UNKNOWNS, :UNKNOWNS]
 
     @property
     def motions(self) -> Motions:
@@ -75,7 +80,7 @@ class HandEye:
     @property
     def noise(self) -> Noise | None:
         """The sizes of the errors of corners and robot; None where no corners were given."""
-        return self.adjusted.noise
+        return self.adjusted.noise if isinstance(self.adjusted.measured, Pixels) else None
 
     @property
     def rms_px(self) -> float:
@@ -161,16 +166,25 @@ class HandEye:
         return np.sqrt(np.diag(covariance)[:3]), np.sqrt(np.diag(shift))
 
 
-def hand_eye(base_from_hand: RigidTransform, cam_from_board: RigidTransform, *, eye_to_hand: bool = False) -> HandEye:
+def hand_eye(
+    base_from_hand: RigidTransform,
+    cam_from_board: RigidTransform,
+    *,
+    eye_to_hand: bool = False,
+    any_scale: bool = False,
+) -> HandEye:
     """X and Z of A X B = Z, from poses of a robot and poses of a board.
 
     A start in closed form (Park & Martin) from the triple of poses that most others agree with is refined over all
-    poses at once. A pose that is off by five times the median or more is set aside.
+    poses at once. A pose that is off by five times the median or more is set aside. How much a turn, a shift across the
+    picture, the board's distance and the robot's own poses count is learnt from what they leave.
 
     Args:
         base_from_hand: The robot's poses, in metres.
         cam_from_board: The board's poses in the pictures that belong to them, in metres.
         eye_to_hand: The camera stands still and the board is on the hand.
+        any_scale: The lengths of `cam_from_board` are in a unit that is not known, as those of a film without a board
+            are. The factor is solved for with X and Z.
 
     Returns: X, Z, and the covariance clustered by pose.
     Raises: PoseError for fewer than three poses, and where there are not as many of the one as of the other.
@@ -185,7 +199,25 @@ def hand_eye(base_from_hand: RigidTransform, cam_from_board: RigidTransform, *, 
     np.True_
     """
     motions = Motions.of(base_from_hand, cam_from_board, eye_to_hand)
+    if any_scale:
+        return _resized(motions, eye_to_hand)
     return _result(_started(motions), eye_to_hand, None)
+
+
+def _resized(motions: Motions, eye_to_hand: bool) -> HandEye:
+    """The solution with the camera's lengths multiplied by the factor of least squares."""
+    factor = 1 / start(motions, None)[2]
+    found = _result(_started(motions.resized(factor)), eye_to_hand, None)
+    for _ in range(MOST_RESIZED):
+        shorter, sigma = found.adjusted.scale
+        if not abs(shorter - 1) > SETTLED * sigma:
+            break
+        factor /= max(shorter, 0.1)
+        found = _result(
+            robust(motions.resized(factor), found.mount_from_cam, found.other_from_board), eye_to_hand, None
+        )
+    adjusted = replace(found.adjusted, also=(found.adjusted.robot_lengths,))
+    return replace(found, adjusted=adjusted, scale=factor)
 
 
 def hand_eye_from_corners(
@@ -194,7 +226,8 @@ def hand_eye_from_corners(
     """`hand_eye` with the board's corners in place of its poses, refined through their reprojection errors.
 
     Each pose of the robot is off by an error of its own, whose size is learnt from the corners and told in `noise`: the
-    board's true pose in every picture is solved for with X and Z. Of the camera's own numbers no error is counted.
+    board's true pose in every picture is solved for with X and Z. Where a picture's corners are off together, as by a
+    camera or a board that is not quite as told, they count less, by as much as is learnt.
 
     Args:
         base_from_hand: The robot's poses, in metres.
@@ -249,12 +282,14 @@ def _result(first: Adjusted, eye_to_hand: bool, pixels: Pixels | None) -> HandEy
     used: Mask = np.asarray(~stray if few else np.ones(len(stray), bool))
     best = replace(first, motions=first.motions.only(used), measured=first.measured.only(used), weights=None)
     best = best.refined()
-    if pixels is not None:
+    side = slice(6, 12) if eye_to_hand else slice(0, 6)
+    if pixels is None:
+        best = weighed(best, side)
+    else:
         best = replace(best, measured=pixels.only(used))
         if not np.isfinite(best.cost):
             raise PoseError("by the robot's poses some corners would lie where the camera has no image")
-        side = slice(6, 12) if eye_to_hand else slice(0, 6)
-        best = best.with_noise_learnt(corner_noise(pixels.only(used), best.motions.cam_from_board), side)
+        best = weighed_in_pixels(best, corner_noise(pixels.only(used), best.motions.cam_from_board), side)
     everywhere = replace(best, motions=first.motions, measured=first.measured, noise=None)
     return HandEye(eye_to_hand, best, used, everywhere.displacements)
 

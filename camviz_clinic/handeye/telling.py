@@ -138,6 +138,6 @@ def _fit(found: HandEye) -> str:
         return f"{said}."
     return (
         f"{said}. The robot's own errors are {1000 * found.noise.shift:.2g} mm along and "
-        f"{np.degrees(found.noise.turn):.2g}° about each axis, the corners' {found.noise.px:.2g} px; by the robot's "
+        f"{np.degrees(found.noise.turn):.2g}° about each axis, the pictures' {found.noise.px:.2g} px; by the robot's "
         f"poses corners are {found.rms_px:.2g} px off (RMS)."
     )
