@@ -68,6 +68,7 @@ class Set:
     marker_mm: float = 0
     dictionary: str = ""
     truth: str = ""
+    finder: str = "auto"  # as of --finder
 
     def files(self, pattern: str) -> list[Path]:
         """The files of a pattern, in order."""
@@ -118,7 +119,7 @@ class Set:
             frames = synchronised(cameras)
             found = {}
             for name, paths in cameras.items():
-                one = detect(paths, self.of_board, workers=1)
+                one = detect(paths, self.of_board, finder=self.finder, workers=1)
                 found[name] = replace(one, places=tuple(frames[name][place] for place in one.places))
             return found
 
