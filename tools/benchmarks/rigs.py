@@ -24,9 +24,11 @@ import cv2
 import numpy as np
 from kernel import table
 
+from camviz.cameras import Camera, Intrinsics
+from camviz.lenses import BrownConrady, KannalaBrandt
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
-from camviz_clinic.calibration import CannotCalibrate, Detections
+from camviz_clinic.calibration import Board, CannotCalibrate, Detections
 from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.findings import rig as checks
 from camviz_clinic.checks.registry import Fault, Finding, Kind
@@ -91,13 +93,21 @@ def position_errors(truth: VirtualRig, placed: Placed) -> Array:
 
 
 def by_opencv(truth: VirtualRig, found: dict[str, Detections], models: dict[str, str]) -> Placed | None:
-    """The same corners in cv2.calibrateMultiview; None where it raises or gives no numbers."""
+    """Where cv2.calibrateMultiview places the cameras; None where it raises or gives no numbers."""
+    rig = calibrated_by_opencv(found, truth.board, models)
+    return None if rig is None else {name: camera.world_from_cam for name, camera in rig.items()}
+
+
+def calibrated_by_opencv(
+    found: dict[str, Detections], board: Board, models: dict[str, str]
+) -> dict[str, Camera] | None:
+    """The cameras of cv2.calibrateMultiview from the same corners; None where it raises or gives no numbers."""
     frames = sorted({place for each in found.values() for place in each.places})
-    corners = truth.board.corners.astype(np.float32)
-    nothing = np.full((1, len(corners), 2), -1, np.float32)
+    corners = board.corners.astype(np.float32)
+    nothing = np.full((1, len(corners), 2), -1, np.float32)  # what is negative was not seen
     images, mask = [], np.zeros((len(found), len(frames)), np.uint8)
     for number, each in enumerate(found.values()):
-        at = dict(zip(each.places, each.corners.astype(np.float32)[:, None], strict=True))
+        at = dict(zip(each.places, np.nan_to_num(each.corners, nan=-1).astype(np.float32)[:, None], strict=True))
         images.append([at.get(frame, nothing) for frame in frames])
         mask[number] = [frame in at for frame in frames]
     sizes = [(each.width, each.height) for each in found.values()]
@@ -105,17 +115,22 @@ def by_opencv(truth: VirtualRig, found: dict[str, Detections], models: dict[str,
     flags = np.where(kinds, cv2.CALIB_RECOMPUTE_EXTRINSIC | cv2.CALIB_FIX_SKEW, 0).astype(np.int32)
     nobody = [None] * len(found)  # it begins by itself
     try:
-        _, _, _, turns, shifts = cv2.calibrateMultiview(
+        _, matrices, lenses, turns, shifts = cv2.calibrateMultiview(
             [corners] * len(frames), images, sizes, mask, kinds, nobody, nobody, nobody, nobody, flags
         )
     except cv2.error:
         return None
-    placed = {}
-    for name, R, t in zip(found, turns, shifts, strict=True):
-        R = np.asarray(R)
+    if not all(np.isfinite(np.concatenate([np.ravel(part) for part in parts])).all()
+               for parts in zip(matrices, lenses, turns, shifts, strict=True)):  # fmt: skip
+        return None
+    rig = {}
+    for name, size, K, D, R, t in zip(found, sizes, matrices, lenses, turns, shifts, strict=True):
+        R, D = np.asarray(R), np.ravel(D)
         rotation = Rotation.from_matrix(R) if R.size == 9 else Rotation.from_rotvec(R.ravel())
-        placed[name] = RigidTransform.from_components(np.ravel(t), rotation).inv()
-    return placed if all(np.isfinite(each.translation).all() for each in placed.values()) else None
+        lens = KannalaBrandt(*D.tolist()) if models[name] == "fisheye" else BrownConrady.from_coefficients(D)
+        pose = RigidTransform.from_components(np.ravel(t), rotation)
+        rig[name] = Camera(Intrinsics.from_matrix(np.asarray(K), *size), lens).at(pose.inv())
+    return rig
 
 
 def row(kind: str, count: int) -> list[str]:
