@@ -148,13 +148,15 @@ class Board:
         sizes = 2 * columns, 2 * rows, pitch, marker_size, dictionary, "markers"
         return cls(*sizes, first_id=first_id, border_bits=border_bits)
 
-    @cached_property  # a solver asks for them at every step
+    @property
     def corners(self) -> Array:
         """The points (columns * rows, 3) in the board's frame, row by row: x along a row, y down, z = 0."""
+        return self._points.copy()
+
+    @cached_property  # a solver asks for them at every step
+    def _points(self) -> Array:
         xy = kind_of(self).points(self)
-        points = np.column_stack([xy, np.zeros(len(xy))])
-        points.flags.writeable = False
-        return points
+        return np.column_stack([xy, np.zeros(len(xy))])
 
     @property
     def area(self) -> tuple[float, float, float, float]:
@@ -176,7 +178,7 @@ class Board:
         Raises: ValueError for other than two sagittas.
         Source: mrcal's documentation, "Board deformation".
         """
-        corners = self.corners.copy()
+        corners = self.corners
         half = np.maximum(corners[:, :2].max(axis=0), self.square_size) / 2
         xi_eta = corners[:, :2] / half - 1
         corners[:, 2] = (1 - xi_eta**2) @ as_point(warp, "warp", 2)

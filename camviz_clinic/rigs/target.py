@@ -59,7 +59,7 @@ class Target(Board):
         return cls(count, 1, size, names=tuple(names), parts=tuple(parts), places=places)
 
     @cached_property
-    def corners(self) -> Array:
+    def _points(self) -> Array:
         """The points (points, 3) of all boards in the target's frame, in metres."""
         return np.concatenate([self.places[i].apply(part.corners) for i, part in enumerate(self.parts)])
 
