@@ -37,23 +37,22 @@ class WrongAnswer:
 
 def wrong_answers(exercise: Exercise) -> list[WrongAnswer]:
     """The typical wrong answers of an exercise, the dearest first."""
-    with Patience() as patience:  # one thread for all calls: each of its own takes ten times as long as the call
-        arguments = _telling_case(exercise, patience)
-        found = [_marked(exercise, one, arguments, patience) for one in exercise.misconceptions]
+    arguments = _telling_case(exercise)
+    found = [_marked(exercise, one, arguments) for one in exercise.misconceptions]
     return sorted(found, key=lambda one: -one.keeps)
 
 
 def example(exercise: Exercise) -> tuple[str, str] | None:
     """A call, and what the right answer gives for it; None where no case fits on a line."""
-    with Patience() as patience:
-        arguments = _telling_case(exercise, patience)
+    arguments = _telling_case(exercise)
     return (exercise.call(arguments), _numbers(exercise.answer(arguments))) if arguments else None
 
 
-def _marked(exercise: Exercise, known: Misconception, arguments: Arguments | None, patience: Patience) -> WrongAnswer:
+def _marked(exercise: Exercise, known: Misconception, arguments: Arguments | None) -> WrongAnswer:
     cases = islice(exercise.cases(np.random.default_rng(0)), MOST_CASES)
-    keeps = kept(exercise, [run(exercise, known.function, one, patience) for one in cases])
-    gives = _numbers(run(exercise, known.function, arguments, patience).actual) if arguments else ""
+    with Patience() as patience:  # one watch for all calls of an answer: to begin one takes longer than a call
+        keeps = kept(exercise, [run(exercise, known.function, one, patience) for one in cases])
+        gives = _numbers(run(exercise, known.function, arguments, patience).actual) if arguments else ""
     return WrongAnswer(known.function.__name__.replace("_", " "), known.explanation, keeps, gives)
 
 
@@ -91,27 +90,24 @@ def _one_slip(exercise: Exercise, trials: list[Trial]) -> bool:
     return turned or bool(scaled)
 
 
-def _telling_case(exercise: Exercise, patience: Patience) -> Arguments | None:
+def _telling_case(exercise: Exercise) -> Arguments | None:
     """Of the cases that fit on a line, the one in which most wrong answers differ from the right one."""
     cases = islice(exercise.cases(np.random.default_rng(0)), MOST_CASES)
-    short = [
-        one
-        for one in (*exercise.shown, *(tuple(map(_rounded, case)) for case in cases))
-        if _fits(exercise, one, patience)
-    ]
+    short = [one for one in (*exercise.shown, *(tuple(map(_rounded, case)) for case in cases)) if _fits(exercise, one)]
 
     def told_apart(arguments: Arguments) -> int:
-        return sum(not run(exercise, known.function, arguments, patience).fits for known in exercise.misconceptions)
+        with Patience() as patience:
+            return sum(not run(exercise, known.function, arguments, patience).fits for known in exercise.misconceptions)
 
     return max(short, key=told_apart, default=None)
 
 
-def _fits(exercise: Exercise, arguments: Arguments, patience: Patience) -> bool:
+def _fits(exercise: Exercise, arguments: Arguments) -> bool:
     """True for a call that fits on a line and has numbers for an answer, rounded arguments or not."""
     call = exercise.call(arguments)
     if "<array" in call or len(call) > LONGEST_CALL:
         return False
-    trial = run(exercise, exercise.reference, arguments, patience)
+    trial = run(exercise, exercise.reference, arguments)
     numbers = np.concatenate([part.ravel() for part in trial.expected])
     return bool(np.isfinite(numbers).all()) and 0 < len(_numbers(trial.expected)) <= LONGEST_CALL
 
