@@ -50,9 +50,24 @@ def pytest_ignore_collect(collection_path, config):
 
 def pytest_collection_modifyitems(config, items):
     if not config.getoption("--all"):
-        left_out = [item for item in items if needs_all(item)]
-        config.hook.pytest_deselected(items=left_out)
-        items[:] = [item for item in items if not needs_all(item)]
+        left_out = {item for item in items if needs_all(item)}
+        left_out |= beyond_their_sample([item for item in items if item not in left_out])
+        config.hook.pytest_deselected(items=list(left_out))
+        items[:] = [item for item in items if item not in left_out]
+
+
+def beyond_their_sample(items):
+    """The cases that a test with `sampled(n)` leaves out: n of them run, evenly spaced, the first among them."""
+    cases = {}
+    for item in items:
+        if item.get_closest_marker("sampled"):
+            cases.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    return {item for each in cases.values() for item in each} - {
+        each[index * len(each) // wanted]
+        for each in cases.values()
+        for wanted in [min(each[0].get_closest_marker("sampled").args[0], len(each))]
+        for index in range(wanted)
+    }
 
 
 def needs_all(item):

@@ -178,6 +178,7 @@ def test_it_comes_back_from_a_poor_start(solved) -> None:
     assert start.refined().sum_of_squares == pytest.approx(solved.sum_of_squares, rel=1e-9)
 
 
+@pytest.mark.thorough
 def test_deviations_are_the_scatter_of_many_solutions() -> None:
     """60 solutions from fresh noise: each parameter, by its foretold σ, scatters as χ² of 60 degrees says it may."""
     rng = np.random.default_rng(6)

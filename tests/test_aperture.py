@@ -46,6 +46,7 @@ LENSES = [
 ]
 
 
+@pytest.mark.sampled(10)
 @pytest.mark.parametrize(("focal", "number", "focus", "depth"), LENSES)
 def test_a_traced_point_is_as_blurred_as_the_closed_form_says(focal, number, focus, depth):
     """Within 2 %, over all of the visualizer's range; seen through a loupe, so that every blur is 40 pixels wide."""

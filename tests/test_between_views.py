@@ -57,11 +57,13 @@ def test_what_two_cameras_take_off_the_squares_is_what_two_solutions_do():
         assert fallen == pytest.approx(solved.sum_of_squares - parts, rel=0.03)
 
 
+@pytest.mark.thorough
 def test_the_chance_is_uniform_where_nothing_but_noise_is_at_work():
     found = [ViewByView.of(healthy(seed)).chance(EARLIER) for seed in range(40)]
     assert kstest(found, "uniform").pvalue > 1e-3
 
 
+@pytest.mark.thorough
 def test_a_board_that_bends_as_it_is_held_is_no_change_of_the_camera():
     """Noise does not explain how the halves differ. The scatter of the views does."""
     for seed in (100, 101, 102):
@@ -72,6 +74,7 @@ def test_a_board_that_bends_as_it_is_held_is_no_change_of_the_camera():
         assert partings.certain == []
 
 
+@pytest.mark.thorough
 def test_the_rank_among_partings_by_lot_is_uniform_where_the_f_test_is_not():
     """The bend weighs on some parameters more than on others, so the scatter is not that of more noise."""
     views = [ViewByView.of(paper(seed)) for seed in range(100, 130)]

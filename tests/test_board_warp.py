@@ -141,6 +141,7 @@ def test_where_the_views_are_certain_held_out_views_are_not_asked(monkeypatch):
     assert not earns_its_place(flat)
 
 
+@pytest.mark.thorough
 def test_a_bend_that_foretells_held_out_views_worse_is_left_out(monkeypatch):
     """With the test over views passed by all, the errors of held-out views alone decide, one way and the other."""
     monkeypatch.setattr(board_warp, "FALSE_ALARMS", 1.0)

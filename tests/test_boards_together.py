@@ -47,6 +47,7 @@ def errors(of, true):
     return np.concatenate([turn, of.pose.translation - true.translation]) / of.deviations
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize("scene", SCENES)
 def test_cameras_and_boards_are_where_they_are_within_three_deviations(scene, thorough):
     off = []
@@ -64,6 +65,7 @@ def test_cameras_and_boards_are_where_they_are_within_three_deviations(scene, th
     assert np.sqrt(np.mean(off**2)) < 1.3
 
 
+@pytest.mark.thorough
 def test_opposite_cameras_never_see_one_side_of_a_plate_together_and_yet_are_placed():
     truth, found = solved("two-sided", 1)
     for board in truth.boards:
@@ -87,6 +89,7 @@ def test_cameras_that_hardly_turn_are_not_tied():
         calibrate_boards(truth.observed(rng), truth.boards)
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize("factor", [0.984, 1.01])
 def test_a_board_that_was_printed_in_another_size_is_measured(factor):
     rng = np.random.default_rng(3)
@@ -105,6 +108,7 @@ def blurred(one):
     return replace(one, corners=one.corners + np.random.default_rng(1).normal(0, 1.0, one.corners.shape))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("spoilt", "said"),
     [(seen_once, "marker1: 1 frame shows it, and its place"), (blurred, "marker1: its corners scatter")],
@@ -118,6 +122,7 @@ def test_a_board_that_was_seen_once_or_fits_worse_is_named_and_no_other(spoilt, 
     assert sentence.startswith(said)
 
 
+@pytest.mark.thorough
 def test_a_known_place_is_kept_and_makes_the_cameras_better():
     truth, found = solved("two-sided", 2)
     _, held = solved("two-sided", 2, known={"back": truth.places["back"]})
@@ -127,6 +132,7 @@ def test_a_known_place_is_kept_and_makes_the_cameras_better():
     assert either[1] < either[0]
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize("name", ["marker0", "marker1"])
 def test_a_marker_that_is_taken_for_another_is_set_aside_and_the_rest_stays(name):
     rng = np.random.default_rng(5)
@@ -152,6 +158,7 @@ def parallel():
     return truth, calibrate_boards(truth.observed(rng), truth.boards, fixed=("k2", "k3", "p1", "p2"))
 
 
+@pytest.mark.thorough
 def test_boards_parallel_to_the_sensor_leave_the_focal_length_without_deviation(parallel):
     truth, found = parallel
     said = told_of(found, BoardsFile(truth.boards, {}, (), {}))
@@ -196,6 +203,7 @@ def test_the_equations_are_those_of_finite_differences():
             assert slope == pytest.approx(-2 * normal.shared_gradient[i], rel=1e-4, abs=0.05), (part, i)
 
 
+@pytest.mark.thorough
 def test_the_deviation_of_a_place_is_that_of_its_first_corner():
     _, found = solved("two-sided", 1)
     place, pose = found.adjustment.place_of_part(1), found.boards["back"]

@@ -100,6 +100,7 @@ def started(folder, *words):
     return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=3000)
 
 
+@pytest.mark.thorough
 def test_a_bundle_installs_and_starts_with_no_network(checkout, tmp_path):
     (tmp_path / "site").mkdir()
     (tmp_path / "site" / "index.html").write_text("the site")

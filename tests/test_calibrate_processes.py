@@ -111,6 +111,7 @@ def test_a_ctrl_c_is_heard_wherever_it_comes(shot):
             assert gone(process.pid, 5)
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize(("ended_by", "status"), [(signal.SIGTERM, 143), (signal.SIGKILL, -9)])
 def test_no_process_outlives_a_calibration(shot, ended_by, status):
     with started(COMMAND, shot) as process:

@@ -225,6 +225,7 @@ def test_the_pose_of_a_board_follows_from_rays_also_behind_the_camera():
     np.testing.assert_allclose(found.as_matrix(), pose.as_matrix(), atol=1e-9)
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("model", MODELS)
 def test_the_true_camera_is_found_within_its_standard_deviations(model):
     truth, rng = TRUTH[model], np.random.default_rng(4)

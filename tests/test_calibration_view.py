@@ -92,6 +92,7 @@ def test_hardly_tilted_boards_are_refined_to_the_minimum_wherever_the_search_beg
     assert problem.refined().cameras["camera"].intrinsics.fx == pytest.approx(value, abs=0.1 * sigma)
 
 
+@pytest.mark.thorough
 def test_sigma_is_the_spread_of_the_estimates_over_many_throws():
     """Within 35 %, from 40 throws of the dice: the deviation of such a deviation is 11 %."""
     views = [CalibrationView(draw=draw, boards=5) for draw in range(1, 41)]

@@ -91,6 +91,7 @@ def worst_held_out(found):
 # What it comes to -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.thorough
 def test_who_follows_the_ghost_knows_the_camera_after_twelve_views(hands, tmp_path):
     rng = np.random.default_rng(2)
     hands.show(None)

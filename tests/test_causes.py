@@ -112,6 +112,7 @@ def test_what_is_the_same_in_many_frames_is_said_once(tmp_path):
     assert "297 times more" in finding.sentence
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("name", ["swapped cameras", "inverted transform", "zeroed distortion", "column off"])
 def test_the_fault_that_was_put_in_is_named_first(name):
     fault = faults()[name]

@@ -41,6 +41,7 @@ def verdict(function, attempt=1, of=DISTANCE, seed=0):
     return judge(of, function, np.random.default_rng(seed), attempt)
 
 
+@pytest.mark.sampled(30)
 @pytest.mark.parametrize("one", ALL, ids=lambda one: one.name)
 def test_no_stub_and_no_constant_is_ever_called_correct(one):
     (first, *_) = list(one.cases(np.random.default_rng(1)))

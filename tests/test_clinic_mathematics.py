@@ -28,6 +28,7 @@ def shifted(camera, **changes):
 # Views it has not seen ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.thorough
 def test_halves_of_a_healthy_set_differ_by_noise_alone() -> None:
     """25 sets: the probabilities are uniform (Kolmogorov-Smirnov, one in a thousand), and the ratio is about 1."""
     rng = np.random.default_rng(1)
@@ -53,6 +54,7 @@ def test_halves_need_three_views_each() -> None:
         halves(problem)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("folds", [None, 5])
 def test_corners_held_out_of_a_healthy_set_are_off_as_foretold(folds) -> None:
     """Ten sets of twelve views: the errors are those that noise, pose and camera should give, within 5 %."""
@@ -178,6 +180,7 @@ def solutions(pair):
     return [noisy(pair, rng, SIGMA).refined() for _ in range(80)]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("uv", [None, (150.0, 340.0)])
 def test_depth_scatters_as_foretold(solutions, uv) -> None:
     """80 noisy calibrations, noise in the match, the point found by camviz's triangulation: σ_Z within 30 %."""

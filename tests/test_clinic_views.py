@@ -518,6 +518,7 @@ def test_errors_without_corners_are_bars_alone():
     assert "does not hold the corners" in view.description()
 
 
+@pytest.mark.sampled(8)
 @pytest.mark.parametrize("name", VIEWS)
 def test_a_view_that_only_the_other_camera_saw_is_drawn_by_none(name):
     """Its pose in this camera's list means nothing: here it is the identity, the board in the camera's own place."""

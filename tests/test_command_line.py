@@ -72,6 +72,7 @@ def test_inspect_reads_stdin_and_names_it(room):
     assert err.startswith(b"camviz: stdin: ")
 
 
+@pytest.mark.thorough
 def test_a_page_and_a_board_can_go_to_stdout(room):
     assert piped(["board", "-o", "-"])[1].startswith(b"%PDF")
     status, out, _ = piped(["show", "-", "-o", "-"], STEREO.read_bytes())
@@ -144,6 +145,7 @@ def test_what_is_no_terminal_gets_no_colour_unless_it_asks(room, capsys):
     assert "\033[31m" in capsys.readouterr().out
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize("encoding", [pytest.param("cp1252", marks=pytest.mark.thorough), "ascii", "utf-8"])
 def test_what_an_encoding_lacks_is_replaced(room, encoding):
     (room / "faulty.yml").write_text(FAULTY)

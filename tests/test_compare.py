@@ -38,6 +38,7 @@ def test_the_numbers_are_those_of_the_polynomial(solved):
     assert page.index(apart.sentence) < page.index('class="verdict"')
 
 
+@pytest.mark.thorough
 def test_two_solutions_of_one_camera_from_other_views_agree_and_it_is_said_how_well():
     for seed in range(3):
         rng = np.random.default_rng(seed)

@@ -57,6 +57,7 @@ def test_a_lesson_is_a_notebook_and_its_folder():
     }
 
 
+@pytest.mark.thorough
 def test_the_pages_list_the_lesson_in_its_place_and_nothing_else_is_written(lesson):
     made = {"README.md", "docs/glossary.md", "lessons/00_start_here.ipynb"}
     assert lesson.touched() == {*made, *example("lessons/")}
@@ -116,6 +117,7 @@ print(json.dumps({
     assert said["wrong"].startswith("The proportion is upside down.")
 
 
+@pytest.mark.thorough
 def test_a_teacher_gets_the_lesson_with_its_key_its_solution_and_its_sheets(lesson, tmp_path):
     lesson.run("-m", "camviz", "teacher", str(tmp_path / "out"), "--no-run", "--slides", "--lesson", NUMBER)
     edition = (tmp_path / "out" / f"{NUMBER}_shadows.ipynb").read_text(encoding="utf-8")
@@ -177,6 +179,7 @@ def test_a_calibration_format_is_one_file(tmp_path):
     assert held(made, "tests/test_formats_contract.py", "toy") > 2
 
 
+@pytest.mark.thorough
 def test_a_finding_is_one_file(tmp_path, thorough):
     made = added(tmp_path, "camviz_clinic/checks/findings/")
     code = """

@@ -57,18 +57,21 @@ def photographed(request):
     return {model: calibrate(found, BOARD, model) for model in ("standard", "rational")}
 
 
+@pytest.mark.thorough
 def test_on_the_samples_the_denominator_stays_above_a_fifth_over_the_whole_image(photographed):
     camera = photographed["rational"].cameras["camera"]
     assert least_denominator(camera) > NEARLY_A_POLE == 0.2
     assert list(kinds()["near-pole"].check(Evidence(photographed["rational"]))) == []
 
 
+@pytest.mark.thorough
 def test_on_the_samples_what_was_held_out_is_predicted_no_worse_than_by_the_standard_model(photographed):
     """The denominator of left*.jpg earns its place. That of right*.jpg does not: its solution is the standard one."""
     standard, rational = (held_out(Adjustment.of(photographed[m]), folds=4).rms for m in ("standard", "rational"))
     assert rational < standard * (1 + 1e-9)  # two solutions of one problem differ by 1e-10
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize("seed", range(3))
 def test_a_lens_without_a_denominator_gets_none(seed):
     _, found = observed(CAMERA, seed)
@@ -79,6 +82,7 @@ def test_a_lens_without_a_denominator_gets_none(seed):
     assert off["ours"] < 2 * off["standard"] + 0.1
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", LENSES)
 def test_a_lens_with_a_denominator_comes_out_no_worse_than_without_the_prior(name):
     errors = {"free": [], "prior": []}
@@ -104,6 +108,7 @@ def test_the_rows_are_the_slopes_of_the_cost():
     assert prior.cost(BrownConrady(k4=-1.5)) == np.inf
 
 
+@pytest.mark.thorough
 def test_sigma_and_the_covariance_count_the_prior_as_bayes_does():
     """Lenses drawn from the prior: errors of k4, k5, k6 have the covariance that is said, and σ is not biased."""
     rng = np.random.default_rng(5)
@@ -143,6 +148,7 @@ def test_a_prior_is_written_and_read_and_is_at_work_when_a_file_is_looked_at(tmp
         camviz_clinic.load(tmp_path / "camera.yml")
 
 
+@pytest.mark.thorough
 def test_a_pair_has_a_prior_for_each_camera():
     left = LENSES["falling"]
     rng = np.random.default_rng(2)

@@ -59,6 +59,7 @@ def test_the_bounds_are_the_extremes_over_the_ellipsoid():
     assert 0 < least < lengths.min()  # which is over a larger ellipsoid
 
 
+@pytest.mark.thorough
 def test_the_truth_lies_within_the_bounds_as_often_as_they_promise():
     """Of draws as unlike as can be: one direction that is hardly known, and a truth at 0, near by, and far off."""
     rng = np.random.default_rng(1)
@@ -82,6 +83,7 @@ def test_chance_reaches_as_far_as_it_is_said_to():
     assert 0.99 <= np.mean(lengths <= reach(columns, root @ root.T)) <= 0.9999
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize("change", [{"fx": 4.0, "fy": 4.0}, {"cx": 6.0, "cy": -4.0}, {"k1": 0.006}])
 def test_the_change_is_that_of_the_difference_map(deployment, change):
     """Without noise the refit finds the change; its size agrees with the map, which is made in another way."""
@@ -233,6 +235,7 @@ def test_a_calibration_that_was_never_better_is_told_from_a_camera_that_changed(
     assert check(bare, seen(after)).verdict == "fail"
 
 
+@pytest.mark.thorough
 def test_corners_without_an_image_and_corners_that_are_noise(deployment):
     _, calibration, after = deployment
     folding = replace(calibration.cameras["camera"], lens=BrownConrady(k1=-2.5))
@@ -368,6 +371,7 @@ def test_two_shared_views_do_not_judge_a_pair(stereo):
 # Two hundred deployments, a share of them -----------------------------------------------------------------------------
 
 
+@pytest.mark.thorough
 def test_a_share_of_the_benchmark_is_judged_rightly(monkeypatch):
     """tools/benchmarks/deployments.py judges 198; these are every 24th."""
     monkeypatch.syspath_prepend(ROOT / "tools/benchmarks")

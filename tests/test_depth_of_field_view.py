@@ -211,6 +211,7 @@ def test_the_photograph_is_the_one_that_traces_every_ray():
     assert cv2.PSNR(view.image(64), exact) > 34
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "state",
     [

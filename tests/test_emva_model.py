@@ -30,6 +30,7 @@ REASONS = {
 }
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("name", ODD)
 def test_a_camera_that_breaks_the_model_has_what_that_spoils_withheld_with_the_reason(name, thorough):
     """No figure is told that is further from the truth than promised, and no bounds exclude it."""
@@ -41,6 +42,7 @@ def test_a_camera_that_breaks_the_model_has_what_that_spoils_withheld_with_the_r
             assert why in found.why(figure)
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("name", ORDINARY)
 def test_nothing_is_found_against_a_camera_that_obeys_the_model(name):
     """One of them, which has pixels enough, is told all its figures."""
@@ -52,6 +54,7 @@ def test_nothing_is_found_against_a_camera_that_obeys_the_model(name):
 SOME = ("drifting offset", "vignetted", *list(ORDINARY)[:2])
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize(
     "name", [name if name in SOME else pytest.param(name, marks=pytest.mark.thorough) for name in ORDINARY | ODD]
 )
@@ -120,6 +123,7 @@ def test_column_noise_is_taken_out_as_row_noise_is():
     assert pixels.value == pytest.approx(camera.dsnu_e.std(), rel=0.05)
 
 
+@pytest.mark.thorough
 def test_the_linearity_of_a_gamma_is_that_of_the_standard_s_fit():
     """By the normal equations of the emva1288 project, over 5-95 % of 255, where 1.77 % was told."""
     _, how, found = asked(ODD["gamma 2.2, 8 bits"], (96, 128), 2)

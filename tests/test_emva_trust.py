@@ -51,6 +51,7 @@ def outside(one, how, found):
 # Many cameras ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.thorough
 def test_every_figure_of_random_cameras_is_near_the_truth_or_withheld(thorough):
     """K 0.01–10 DN/e⁻, 8–16 bits, read noise 0.3–30 e⁻, row noise up to 30 e⁻, up to 60 % of the dark pixels clipped.
 
@@ -70,6 +71,7 @@ def test_every_figure_of_random_cameras_is_near_the_truth_or_withheld(thorough):
     assert told > 1.46 * cameras  # of 20 each: much is withheld of such frames, and not all
 
 
+@pytest.mark.thorough
 def test_a_well_exposed_camera_of_twelve_bits_tells_every_figure():
     """50 levels of 300k pixels, stacks of 16, patterns of rows, columns and pixels. False failure: below 1 %."""
     rng, size = np.random.default_rng(12), (480, 640)
@@ -85,6 +87,7 @@ def test_a_well_exposed_camera_of_twelve_bits_tells_every_figure():
 # Rounding -------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.thorough
 def test_noise_below_the_quantisation_limit_is_bounded_and_not_taken_for_what_is_left_of_it():
     """8 bits, K = 0.05 DN/e⁻, σ = 3 e⁻: 0.15 DN of noise, of which whole numbers show none or too much.
 
@@ -118,6 +121,7 @@ def test_the_noise_before_rounding_lies_within_its_bounds(sigma, mean):
 # A clipped black level ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize("frames", [0, 16])
 @pytest.mark.parametrize("share", [0.1, 0.5])
 def test_a_clipped_black_level_is_noticed_with_and_without_a_stack(frames, share):
@@ -171,6 +175,7 @@ def test_more_lies_beyond_an_end_than_is_said_whatever_the_pattern():
 # Rows -----------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.thorough
 def test_noise_that_rows_share_is_no_fixed_pattern_of_rows():
     """25 e⁻ of it in stacks of 32 leave 4 e⁻ in the rows' means, which were told as fixed rows of a total of 3 e⁻."""
     one = camera(row_e=25.0, dsnu_e=3.0, offset_dn=90.0)
@@ -200,6 +205,7 @@ def test_fixed_rows_are_found_under_rows_that_change():
 ROWS = [np.random.default_rng(11).standard_normal((400, 1))] * 60
 
 
+@pytest.mark.thorough
 def test_rows_with_noise_of_their_own_do_not_make_a_camera_saturated():
     """20 cameras of 64 rows, 25 e⁻ of row noise beside 17 of light, none exposed beyond 70 % of its well.
 
@@ -256,6 +262,7 @@ def test_estimates_carry_chance_and_what_is_hidden_through_a_quotient():
     assert combined([1, -1], [one, replace(one)]).error == pytest.approx(0.1 * np.sqrt(2))
 
 
+@pytest.mark.thorough
 def test_patterns_of_gain_and_offset_that_are_alike_by_chance_are_told_apart_by_their_pictures():
     """DSNU and PRNU in the same columns: s²_y − s²_y.dark would tell 2.5 % where the gain differs by 2 %."""
     rng = np.random.default_rng(15)

@@ -82,6 +82,7 @@ def test_the_gallerys_page_has_every_report():
     assert gallery.PAGE.read_text(encoding="utf-8") == gallery.page()
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("patient", gallery.PATIENTS, ids=lambda each: each.name)
 def test_a_report_of_the_gallery_shows_the_finding_that_its_page_names(patient):
     inspection = patient.inspection()

@@ -27,6 +27,7 @@ def nonsense(picture: dict) -> set[str]:
     return set(NO_NUMBER.findall(f"{picture['html']}>{picture['described']}<"))
 
 
+@pytest.mark.sampled(5)
 @pytest.mark.parametrize("name", STATES)
 def test_every_number_of_a_picture_is_one_at_the_ends_of_every_control(name):
     explorer = Explorer(STATES[name](), STATES[name]().offered())
@@ -39,6 +40,7 @@ def test_every_number_of_a_picture_is_one_at_the_ends_of_every_control(name):
             assert (field, asked, nonsense(explorer.frame)) == (field, asked, set())
 
 
+@pytest.mark.sampled(8)
 @pytest.mark.parametrize("name", STATES)
 def test_what_is_no_number_reaches_no_view(name):
     explorer = Explorer(STATES[name](), STATES[name]().offered())

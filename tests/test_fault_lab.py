@@ -19,6 +19,7 @@ def names(made):
     return {finding.id for finding in made.inspection.findings}
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("fault", lab_faults())
 def test_every_fault_at_full_strength_is_named_by_the_inspection(fault):
     for seed in (1, 2):
@@ -122,12 +123,14 @@ def ward():
     return Ward(16)
 
 
+@pytest.mark.thorough
 def test_a_ward_has_one_healthy_patient_and_each_fault_once(ward):
     findings = [ward[i].finding for i in range(1, len(ward) + 1)]
     assert findings.count(HEALTHY) == 1
     assert len(set(findings)) == len(ward) == 8
 
 
+@pytest.mark.thorough
 def test_the_clinic_finds_what_every_patient_has(ward):
     for patient in (ward[i] for i in range(1, len(ward) + 1)):
         found = {finding.id for finding in patient.inspected().findings}

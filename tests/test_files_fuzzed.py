@@ -55,6 +55,7 @@ def anywhere(tmp_path_factory):
 FUZZ = settings.get_profile("damage")
 
 
+@pytest.mark.sampled(15)
 @pytest.mark.parametrize("original", FILES, ids=lambda path: path.name)
 @FUZZ
 @given(data=st.data())
@@ -63,6 +64,7 @@ def test_a_truncated_file_is_read_or_refused(beside, original, data):
     attempt(beside(original), content[: data.draw(st.integers(0, len(content) - 1))])
 
 
+@pytest.mark.sampled(15)
 @pytest.mark.parametrize("original", FILES, ids=lambda path: path.name)
 @FUZZ
 @given(data=st.data())
@@ -99,6 +101,7 @@ ODD = st.sampled_from(
 )
 
 
+@pytest.mark.sampled(8)
 @pytest.mark.parametrize("original", TREES, ids=lambda path: path.name)
 @FUZZ
 @given(data=st.data())

@@ -346,6 +346,7 @@ LARGEST = {
 OFTEN = ("open literal", "kitti lines", "attributes")  # of each parser one; the others with --all
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize(
     "name", [name if name in OFTEN else pytest.param(name, marks=pytest.mark.thorough) for name in LARGEST]
 )

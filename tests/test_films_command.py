@@ -47,6 +47,7 @@ def films(shot, room, monkeypatch):
     assert list((room / "meanwhile").iterdir()) == []
 
 
+@pytest.mark.thorough
 def test_a_film_gives_a_camera_whose_views_are_named_by_frame(films, capsys):
     assert main(["calibrate", "left.avi", *WORDS, "--frames", "8"]) == 0
     said = capsys.readouterr().out
@@ -85,6 +86,7 @@ def test_films_of_a_pair_give_their_baseline(films, capsys):
     assert [name[-10:] for name in left] == [name[-10:] for name in right]
 
 
+@pytest.mark.thorough
 def test_films_of_a_rig_place_its_cameras_by_their_names(films, capsys):
     words = ["calibrate", "--rig", "left.avi", "right.avi", *WORDS, "--frames", "99", "-o", "rig.toml"]
     assert main(words) == 0
@@ -150,6 +152,7 @@ def test_a_phones_still_has_the_sensors_rows_and_columns_and_its_exif(orientatio
     assert picture_exif(found)[0x010F] == "Maker"
 
 
+@pytest.mark.thorough
 def test_heic_stills_calibrate_a_camera_and_a_damaged_one_is_named(shot, room, capsys):
     heif = pytest.importorskip("pillow_heif")
     heif.register_heif_opener()

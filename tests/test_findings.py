@@ -173,6 +173,7 @@ def test_an_added_parameter_is_found_with_its_value_and_deviation():
     assert k1.sigmas[0] < 0.002
 
 
+@pytest.mark.thorough
 def test_noise_alone_explains_as_f_says():
     """Over 30 sets of nothing but noise the chances of the F-test are spread evenly (Kolmogorov's distance)."""
     chances = []

@@ -60,6 +60,7 @@ def test_exact_corners_give_the_exact_fisheye():
     assert off_by(solution(exact)).max() < 1e-9
 
 
+@pytest.mark.thorough
 def test_corners_are_found_without_bias_where_the_fisheye_sees_them(found):
     assert len(found.pictures) == 12
     off = found.corners - true_corners()
@@ -67,6 +68,7 @@ def test_corners_are_found_without_bias_where_the_fisheye_sees_them(found):
     assert np.sqrt((off**2).mean()) < 0.08
 
 
+@pytest.mark.thorough
 def test_rays_land_where_the_true_fisheye_has_them(solved):
     """Corners reach out to 58°. White noise as large as the corner finder's errors would cost 0.3 px there."""
     off = off_by(solved)

@@ -48,6 +48,7 @@ def drawn(camera, pose):
     return cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
 
 
+@pytest.mark.thorough
 def test_omnidirectional_calibration_from_rendered_pictures_finds_f_over_one_plus_xi():
     """Photographed, found and solved: f/(1 + ξ) comes out ten times as surely as f or ξ alone."""
     poses = boards(np.random.default_rng(5), 7, 0.75)

@@ -102,6 +102,7 @@ def test_an_example_is_known_for_what_it_is_and_read_back_the_same(tmp_path, nam
     check_example_is_read(name, tmp_path)
 
 
+@pytest.mark.sampled(12)
 @pytest.mark.parametrize("name", formats())
 def test_a_damaged_example_is_read_or_refused_in_one_sentence(tmp_path, name):
     check_damage_is_read_or_refused(name, tmp_path)

@@ -71,6 +71,7 @@ def test_a_perfect_robot_and_camera_give_x_and_z_exactly(eye_to_hand, how):
         assert ours.as_matrix() == pytest.approx(theirs.as_matrix(), abs=1e-7)
 
 
+@pytest.mark.sampled(1)
 @BOTH
 def test_from_corners_x_is_nearer_than_in_closed_form_and_the_robots_errors_are_found(eye_to_hand, thorough):
     errors, sizes = [], []
@@ -128,6 +129,7 @@ def test_the_covariance_is_the_jackknifes():
     assert found.translation_sigma == pytest.approx(np.sqrt(19 / 20 * np.sum(moves**2, axis=0)), rel=0.03)
 
 
+@pytest.mark.thorough
 @BOTH
 def test_of_many_cells_95_in_100_lie_within_95_per_cent_intervals(eye_to_hand, thorough):
     inside, z = [], []
@@ -174,6 +176,7 @@ def seen_badly_along_the_optical_axis(rng, true, turn=0.002, across=0.0005, alon
     return RigidTransform.from_components(boards.translation + shift, turned)
 
 
+@pytest.mark.sampled(1)
 @BOTH
 def test_poses_of_a_board_whose_distance_is_seen_badly_give_x_by_their_directions(eye_to_hand):
     """X is nearer than where all counts alike, in 12 cells, and the sizes of turn and distance are found."""
@@ -247,6 +250,7 @@ def test_a_camera_without_its_distortion_is_not_blamed_on_the_robot():
     assert np.median(learnt) < 0.6 * np.median(blamed)
 
 
+@pytest.mark.thorough
 def test_turns_about_one_axis_leave_x_unknown_along_it_and_nowhere_else():
     rng = np.random.default_rng(10)
     true = cell(rng, turns=about_one_axis(rng, 15), robot_deg=0.01)

@@ -66,6 +66,7 @@ def test_x_is_printed_and_kept_with_a_sigma_that_reaches_the_truth(words, shot, 
     assert Z.translation == pytest.approx(shot.true.Z.translation, abs=0.002)
 
 
+@pytest.mark.thorough
 def test_json_is_strict_and_says_the_same(words, room, capsys):
     assert main((*words(), "--json", "-o", "other.yaml")) == 0
     said = json.loads(capsys.readouterr().out, parse_constant=lambda name: pytest.fail(name))
@@ -75,6 +76,7 @@ def test_json_is_strict_and_says_the_same(words, room, capsys):
     assert said["usable"] is True
 
 
+@pytest.mark.thorough
 def test_poses_that_must_be_mended_are_a_fault_and_nothing_is_written(words, room, shot, capsys):
     assert main(words(shot.true.base_from_hand.inv())) == 1
     said = capsys.readouterr().out

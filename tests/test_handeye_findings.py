@@ -43,6 +43,7 @@ def test_nothing_is_found_where_nothing_is_wrong(thorough):
         assert healthy_case(np.random.default_rng([32, seed])).findings == ()
 
 
+@pytest.mark.thorough
 def test_a_unit_is_named_with_what_asks_for_it():
     true = cell(np.random.default_rng(1), 10)
     millimetres = case(scaled(true, 1000))
@@ -53,6 +54,7 @@ def test_a_unit_is_named_with_what_asks_for_it():
     assert "by 25.4" in inches.remedy
 
 
+@pytest.mark.thorough
 def test_two_mistakes_at_once_are_named_together():
     true = cell(np.random.default_rng(2), 10)
     both = scaled(true, 1000).base_from_hand.inv()
@@ -61,6 +63,7 @@ def test_two_mistakes_at_once_are_named_together():
     assert "--unit mm" in finding.remedy
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("to_hand", [False, True])
 def test_inverted_poses_and_the_other_arrangement_are_one_equation_and_both_are_named(to_hand):
     true = cell(np.random.default_rng(3), 10, to_hand)
@@ -69,6 +72,7 @@ def test_inverted_poses_and_the_other_arrangement_are_one_equation_and_both_are_
     assert ("--eye-to-hand left out" in said) == (not to_hand)
 
 
+@pytest.mark.thorough
 def test_a_shift_is_named_with_its_direction():
     true = cell(np.random.default_rng(4), 12)
     late = replace(true, base_from_hand=true.base_from_hand[:-2], pixels=true.pixels[2:])
@@ -77,6 +81,7 @@ def test_a_shift_is_named_with_its_direction():
     assert "the pose 1 row further up" in of(case(early), "poses-shifted").sentence
 
 
+@pytest.mark.thorough
 def test_an_order_is_named():
     true = cell(np.random.default_rng(5), 12)
     assert "reversed" in of(case(true.told(true.base_from_hand[::-1])), "poses-reordered").sentence
@@ -122,6 +127,7 @@ def test_ten_degrees_about_a_second_axis_are_enough(second, found):
     assert (finding and finding.id) == found
 
 
+@pytest.mark.thorough
 def test_a_robot_that_did_not_turn_leaves_the_whole_place_unknown():
     true = cell(np.random.default_rng(9), turns=Rotation.from_rotvec(np.zeros((10, 3)) + [0.1, 0.2, 0]))
     found = case(true)
@@ -141,6 +147,7 @@ def test_a_stray_pose_is_named_with_its_picture_and_how_far_it_is_off():
     assert found.usable
 
 
+@pytest.mark.thorough
 def test_a_delay_is_measured():
     true = moving(np.random.default_rng(11), 35, 0.1)
     finding = of(case(true, RobotPoses(true.base_from_hand, times=true.times)), "time-offset")

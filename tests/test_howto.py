@@ -16,6 +16,7 @@ def files(tmp_path_factory):
 
 
 LONG = (  # a quarter of a minute or more each: with --all
+    "calibrate-a-camera",
     "calibrate-a-pair",
     "calibrate-a-rig",
     "calibrate-from-a-film",

@@ -63,6 +63,7 @@ def test_how_far_the_farthest_corner_moves_is_so_to_first_order():
     assert left / step == pytest.approx(one.most, rel=0.15)
 
 
+@pytest.mark.thorough
 def test_the_standard_deviation_is_the_scatter_of_many_solutions():
     """Boards tilted by up to 4°, so that a solution does not run away: fx of 24 sets of noise."""
     problem, rng = exact(4), np.random.default_rng(5)
@@ -132,6 +133,7 @@ def test_what_the_other_camera_sees_can_only_help():
 # In words ------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("name", "strength", "cause", "severity", "said"),
     [

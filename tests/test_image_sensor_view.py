@@ -240,6 +240,7 @@ def test_a_view_opens_with_the_panels_that_are_asked_for_and_others_by_buttons()
         ImageSensorView(panels="spectrum")
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("turns", [0.0, 0.37, 2.9])
 @pytest.mark.parametrize("during", [0.012, 0.12, 0.7])
 def test_a_blurred_fan_is_the_mean_of_the_sharp_ones_meanwhile(turns, during):

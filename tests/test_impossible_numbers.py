@@ -69,6 +69,7 @@ def refusal(path, **options):
     return ""
 
 
+@pytest.mark.sampled(10)
 @pytest.mark.parametrize("name", sorted(set(formats()) - set(BINARY)))
 def test_a_file_with_an_absurd_number_is_inspected_or_refused(name, tmp_path, thorough):
     """Whatever else is raised fails the test."""
@@ -96,6 +97,7 @@ def with_lens(**values):
     return replace(CAMERA, lens=replace(CAMERA.lens, **values))
 
 
+@pytest.mark.thorough
 def test_a_pair_whose_halves_share_no_rays_is_inspected_and_its_numbers_are_named():
     """The corners of the left camera, solved anew from a skew of 100,000, lead nowhere: not checked, and why."""
     pair = calibrations.pair()

@@ -55,6 +55,7 @@ def test_the_interval_is_that_of_the_delta_method_in_a_large_class_whose_student
     assert found.gain - found.low == pytest.approx(half, rel=0.12)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("students", "least", "most"), [(10, 0.83, 0.95), (40, 0.90, 0.985)])
 def test_about_19_of_20_intervals_hold_the_true_gain_and_fewer_in_a_small_class(rng, students, least, most):
     """So says docs/learning.md, from more classes than these."""

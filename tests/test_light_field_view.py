@@ -70,6 +70,7 @@ def test_the_picture_is_what_scipy_shifts_and_numpy_sums():
     np.testing.assert_allclose(view.image().astype(int), to_display(np.mean(total, axis=0)).astype(int), atol=1)
 
 
+@pytest.mark.thorough
 def test_openings_blur_a_view_by_its_slope_and_leave_what_is_in_focus():
     pinholes, wide = (
         LightFieldView(column=BALL[0], row=BALL[1]),

@@ -56,6 +56,7 @@ print(alone, pages())
 """
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform != "linux", reason="only glibc can be asked to give memory back")
 def test_what_a_cell_no_longer_needs_is_given_back_after_it():
     freed, hooks = subprocess.run(
@@ -72,6 +73,7 @@ def test_the_rays_of_the_last_camera_are_given_back_too():
     assert _kept_rays.cache_info().currsize == 0
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform != "linux", reason="only glibc can be asked to keep memory")
 def test_a_picture_s_memory_is_that_of_the_last_one():
     """Counted in pages that the system had to clear and hand out."""
@@ -119,6 +121,7 @@ def test_what_a_view_has_worked_out_is_given_back_and_worked_out_again():
     assert view.figure().flow() == drawn
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize("kind", [EpipolarView, FrustumView, LightFieldView, OmnidirectionalView, PhotonTransferView])
 def test_the_garden_is_given_back_while_its_views_are_shown(kind):
     shown = explore(kind())
@@ -129,6 +132,7 @@ def test_the_garden_is_given_back_while_its_views_are_shown(kind):
     assert shown.view.figure().flow() == shown.frame["html"]
 
 
+@pytest.mark.thorough
 def test_light_fields_of_the_garden_are_taken_once_and_those_through_openings_given_back():
     shown = explore(LightFieldView(fence=True, opening=1.0, panels="picture views"))
     pinholes = garden_field.garden_field(True)

@@ -23,6 +23,7 @@ def pupil_overlap(s, waves):
     return np.sum(np.cos(phase) * both) * (2 / (n - 1)) ** 2 / np.pi
 
 
+@pytest.mark.sampled(5)
 @pytest.mark.parametrize("s", [0.05, 0.2, 0.5, 0.8])
 @pytest.mark.parametrize("waves", [0.0, 0.25, 0.5, 1.0, 3.0])
 def test_a_lens_passes_what_its_pupil_has_in_common_with_its_moved_copy(s, waves):

@@ -21,6 +21,7 @@ def of(set_up, rng):
     return motion(Evidence(set_up.solved(set_up.observed(rng))).observed["camera"])
 
 
+@pytest.mark.thorough
 def test_a_shutter_that_moves_corners_by_a_pixel_is_named(thorough):
     """30 px between the first and the last row move corners by a pixel more than poses can follow."""
     named = []
@@ -34,6 +35,7 @@ def test_a_shutter_that_moves_corners_by_a_pixel_is_named(thorough):
     assert np.mean(named) >= 0.95
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("name", ["bending board", "warped board", "lens too rich", "autofocus drift"])
 def test_no_other_fault_is_taken_for_a_shutter(name, thorough):
     for seed in range(3 if thorough else 1):
@@ -55,6 +57,7 @@ def test_what_is_read_by_columns_is_no_shutter_of_rows(monkeypatch):
     assert not turned.by_rows
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.skipif("CAMVIZ_SAMPLES" not in os.environ, reason="needs OpenCV's photographs in CAMVIZ_SAMPLES")
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize("finder", ["auto", pytest.param("classic", marks=pytest.mark.thorough)])
@@ -69,6 +72,7 @@ def test_photographs_of_a_global_shutter_have_no_rolling_one(side, finder):
         assert found.clearly < 0.02
 
 
+@pytest.mark.thorough
 def test_views_that_differ_are_told_with_their_size_and_no_shutter():
     inspection = Inspection.of(faults()["bending board"].inject(np.random.default_rng(300), 3))
     (finding,) = [each for each in inspection.findings if each.id == "views-differ"]

@@ -97,6 +97,7 @@ def test_a_few_pixels_at_an_end_are_noise_and_more_are_not(share, kept):
 # Which way it leans --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("angle_deg", [31, 35, 40, 44, 50, 55, 59])
 @pytest.mark.parametrize(("blur", "size"), [("pixel", 0.0), ("gauss", 1.5)])
 def test_edges_steeper_than_30_degrees_are_refused_with_their_angle(blur, size, angle_deg):
@@ -236,6 +237,7 @@ def test_the_sharpest_edge_in_a_poor_jpeg_is_refused():
         read(poor)
 
 
+@pytest.mark.thorough
 def test_noise_blurred_after_the_sensor_widens_the_error_as_far_as_it_scatters():
     """Noise averaged over 3 × 3 pixels: 40 photographs. False failure: 3e-3 (a deviation of 40 is known to 11 %)."""
     sharp, rng = photograph("gauss", 1.0, 5, SHAPE), np.random.default_rng(4)
@@ -254,6 +256,7 @@ def test_noise_blurred_after_the_sensor_widens_the_error_as_far_as_it_scatters()
 # Whole numbers -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.thorough
 def test_the_rounding_that_a_side_s_pixels_share_is_part_of_the_error():
     """60 pictures of 8 bits without noise, their levels at any place between two numbers: most within 2 errors.
 
@@ -294,6 +297,7 @@ def test_numbers_of_16_bits_and_light_as_it_is_have_hardly_any_rounding():
 # What is clean is measured -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize("noise", [0.0, 0.01, 0.03])
 def test_clean_edges_are_measured_at_all_angles(noise):
     rng = np.random.default_rng(11)

@@ -51,6 +51,7 @@ def test_a_new_lens_is_one_file(checkout):
     assert [path.name for path in (checkout / "camviz").iterdir() if not path.is_symlink()] == ["lenses"]
 
 
+@pytest.mark.thorough
 def test_it_obeys_the_laws_of_all_lenses(checkout):
     """The contract tests find its examples, valid and invalid."""
     said = python(
@@ -107,6 +108,7 @@ for finding in fold.check(Evidence(Calibration({"camera": camera}, Path(), "here
     assert "The distortion turns back 100.0° from the axis, which is 1.11 focal lengths" in said
 
 
+@pytest.mark.thorough
 def test_it_can_be_calibrated_with_no_solver_of_opencvs(checkout):
     """From six exact views of a board, the camera that saw them."""
     code = """

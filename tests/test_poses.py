@@ -44,6 +44,7 @@ def in_sigmas(found, truth):
     return np.concatenate([place / found.place_sigma, turn / found.turn_sigma], axis=1)
 
 
+@pytest.mark.thorough
 def test_corners_with_noise_give_poses_within_3_sigmas_in_99_percent_and_the_sigmas_are_not_too_large():
     rng, off = np.random.default_rng(0), []
     for _ in range(8):
@@ -55,6 +56,7 @@ def test_corners_with_noise_give_poses_within_3_sigmas_in_99_percent_and_the_sig
     assert np.sqrt(np.mean(off**2, axis=0)) == pytest.approx(np.ones(6), abs=3 * scatter)
 
 
+@pytest.mark.thorough
 def test_one_marker_gives_poses_within_3_sigmas_and_none_of_its_four_corners_is_set_aside():
     marker, rng, off = Board.marker_grid(1, 1, 0.1, "DICT_4X4_50"), np.random.default_rng(0), []
     for _ in range(4):
@@ -82,12 +84,14 @@ def rendered(board, seed, views, noise, finder="saddles"):
     return detections(corners), truth
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.thorough) for n in range(1, 6))])
 def test_rendered_tags_give_poses_within_3_sigmas_in_99_percent(seed):
     found, truth = rendered(TAGS, seed, 12, 6)
     assert (np.abs(in_sigmas(find_poses(CAMERA, TAGS, found), truth)) < 3).mean() >= 0.99
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.thorough) for n in range(1, 6))])
 def test_rendered_chessboards_do_so_at_their_saddle_points_and_those_of_sectors_do_not(seed):
     found, truth = rendered(CHESS, seed, 12, 3)
@@ -133,6 +137,7 @@ def test_what_the_camera_is_uncertain_by_is_added():
     assert np.abs(in_sigmas(known, truth)).max() < 4
 
 
+@pytest.mark.thorough
 def test_noise_that_neighbours_share_widens_the_sigmas_until_they_hold():
     rng = np.random.default_rng(5)
     truth = spread_boards(rng, (CAMERA,), CHESS, 40, (15, 40))

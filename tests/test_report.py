@@ -75,6 +75,7 @@ def page(request):
     return inspected(request.param), text, parsed(text)
 
 
+@pytest.mark.sampled(1)
 def test_every_link_inside_the_page_leads_somewhere(page):
     _, _, parts = page
     inside = {link[1:] for link in parts.links if link.startswith("#")}
@@ -170,6 +171,7 @@ def test_a_board_in_space_is_called_by_the_number_of_its_picture():
     assert all(int(name.removeprefix("left")) == int(number) for name, number in boards)
 
 
+@pytest.mark.thorough
 def test_of_many_views_the_worst_are_shown_and_the_page_says_so():
     """Five hundred views, the tenth of which is bad."""
     few = single(views=10)

@@ -43,6 +43,7 @@ def test_a_face_of_the_earth_is_that_of_py360convert(room, face, letter):
     assert psnr(cv2.imread("face.png"), theirs) > 45
 
 
+@pytest.mark.thorough
 def test_to_a_cube_and_back_the_earth_stays_where_it_was(room):
     assert main(["reproject", str(EARTH), "-o", "cube.png", "--from", "equirectangular", "--to", "cube"]) == 0
     assert cv2.imread("cube.png", cv2.IMREAD_UNCHANGED).shape == (1536, 2048, 4)

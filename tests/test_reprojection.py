@@ -95,6 +95,7 @@ def pairs(sources):
             yield pytest.param(source, target, marks=[] if often else [pytest.mark.thorough])
 
 
+@pytest.mark.sampled(10)
 @pytest.mark.parametrize(
     ("source", "target"),
     list(pairs(["equirectangular", "cylinder", "cross", "strip", "equidistant", "Kannala-Brandt"])),

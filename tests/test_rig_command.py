@@ -58,6 +58,7 @@ def test_a_rig_of_folders_is_placed_told_of_and_written(room, capsys):
     assert "rig.toml: written. The format does not hold the board" in said
 
 
+@pytest.mark.thorough
 def test_a_rig_is_written_for_another_program_and_its_known_lens_is_held(room, capsys):
     words = ["calibrate", "--rig", "cam0", "cam1", *WORDS, "--fix", "k3", "--to", "kalibr", "-o"]
     assert main([*words, "chain.yaml"]) == 0

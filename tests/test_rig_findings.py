@@ -52,6 +52,7 @@ def alone(truth, rng):
     return by_themselves(calibration), np.arange(rows)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("frames", [pytest.param(1, marks=pytest.mark.thorough), -2, 0.5])
 def test_a_delay_is_measured_to_a_quarter_of_a_frame_and_its_camera_named(frames):
     truth, late, rng = film(3, frames=72, late={"cam1": frames})  # between two frames the board goes nearly straight on
@@ -68,6 +69,7 @@ def test_a_delay_between_two_cameras_is_told_of_the_second():
     assert measured["cam1"].frames == pytest.approx(-1, abs=0.26)
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize("name", ["cam0", "cam2"])
 def test_a_camera_that_was_moved_is_named_with_the_first_frame_after_it(name):
     truth, _, rng = film(5)
@@ -121,6 +123,7 @@ def mentioned(calibration, **more):
     return {kind.id for kind in KINDS} & said
 
 
+@pytest.mark.thorough
 def test_a_report_says_nothing_of_rigs_but_of_what_may_be_one():
     """Not of one camera, nor of a pair without frames; of a pair with frames and of any rig. What compares them is
     mentioned where they are compared.

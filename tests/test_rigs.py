@@ -60,6 +60,7 @@ def test_relative_poses_are_true_within_three_of_their_deviations(thorough):
     assert 0.7 < np.sqrt(np.mean(off**2)) < 1.3
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("bend", [0, 0.5])
 def test_intervals_hold_by_frames_also_where_a_board_bends_as_it_is_held(bend, thorough):
     """Of the 95 % intervals of relative poses and of intrinsics 90 to 98.5 % hold, whether each frame's board is bent

@@ -35,6 +35,7 @@ def film(shot, room):
     (room / "film.avi").write_bytes(shot.read_bytes())
 
 
+@pytest.mark.thorough
 def test_a_film_gives_camera_and_delay_in_words_in_the_file_and_as_json(film, capsys):
     assert main(["calibrate", "film.avi", *WORDS, "--rolling-shutter", "estimate"]) == 0
     said = capsys.readouterr().out

@@ -101,6 +101,7 @@ def test_a_global_shutter_has_no_delay_and_is_not_offered_one():
         with_rolling_shutter(film.start, film.seen, film.times)
 
 
+@pytest.mark.thorough
 def test_what_is_read_along_columns_is_not_taken_for_rows(film):
     """The film on its side: its columns are read one after the other."""
     corners = film.seen.corners[..., ::-1][:32]

@@ -103,6 +103,7 @@ def test_the_photographs_are_opencvs(published, monkeypatch):
         np.testing.assert_array_equal(picture[..., ::-1], cv2.imread(str(published / name)))
 
 
+@pytest.mark.thorough
 def test_the_virtual_camera_steps_in_with_boards_that_opencv_finds():
     """Calibrating from the rendered pairs returns the focal length and the baseline they were rendered with."""
     left, right = chessboard_pictures("left"), chessboard_pictures("right")

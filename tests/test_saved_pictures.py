@@ -25,6 +25,7 @@ def test_a_state_of_every_view_is_among_them():
     assert {type(make()).__name__ for make in STATES.values()} == set(classes())
 
 
+@pytest.mark.sampled(20)
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize("name", STATES)
 def test_a_saved_view_holds_nothing_that_only_browsers_know(name, theme, tmp_path):

@@ -39,6 +39,7 @@ def stands(said, name):
     return float(line.split()[2]), float(line.split()[4])
 
 
+@pytest.mark.thorough
 def test_two_cameras_and_the_markers_of_a_wall_are_placed_told_of_and_written(room, capsys):
     words = ["calibrate", "--rig", "wall/cam0", "wall/cam1", "--boards", "wall.toml", "--fix", "k3", "--workers", "1"]
     assert main([*words, "-o", "rig.toml", "--places", "solved.toml", "--report", "rig.html"]) == 0
@@ -78,6 +79,7 @@ def film(path, pictures):
     writer.release()
 
 
+@pytest.mark.thorough
 def test_films_of_several_boards_give_frames_by_which_cameras_and_markers_are_placed(room, capsys):
     for name in room:
         film(f"{name}.avi", sorted(Path("wall", name).iterdir()))

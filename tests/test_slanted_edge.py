@@ -90,6 +90,7 @@ def true_mtf50(blur, size, angle_deg):
     return brentq(lambda f: true_mtf(blur, size, angle_deg, f) - 0.5, 1e-6, min(end, 0.95))
 
 
+@pytest.mark.sampled(14)
 @pytest.mark.parametrize(("blur", "size"), BLURS)
 @pytest.mark.parametrize("angle_deg", ANGLES_DEG)
 def test_mtf50_is_within_one_percent_without_noise(blur, size, angle_deg):
@@ -98,13 +99,15 @@ def test_mtf50_is_within_one_percent_without_noise(blur, size, angle_deg):
     assert edge.mtf50 == pytest.approx(true_mtf50(blur, size, angle_deg), rel=0.01)
 
 
-@pytest.mark.parametrize("size", [pytest.param(0.5, marks=pytest.mark.thorough), 2.0])
+@pytest.mark.thorough
+@pytest.mark.parametrize("size", [0.5, 2.0])
 def test_the_wide_feet_of_diffraction_are_cut_off_and_read_as_up_to_three_percent_sharper(size):
     """Its line spread falls with 1/x² only; no window holds all of it, and the standard's holds less."""
     edge = SlantedEdge.of(photograph("airy", size, 5))
     assert 0 < edge.mtf50 / true_mtf50("airy", size, 5) - 1 < 0.03
 
 
+@pytest.mark.sampled(8)
 @pytest.mark.parametrize(("blur", "size"), BLURS)
 @pytest.mark.parametrize("angle_deg", [2, 5, 10, 15])
 def test_mtf50_is_within_three_percent_with_two_percent_noise(blur, size, angle_deg):
@@ -114,6 +117,7 @@ def test_mtf50_is_within_three_percent_with_two_percent_noise(blur, size, angle_
     assert SlantedEdge.of(noisy).mtf50 == pytest.approx(true_mtf50(blur, size, angle_deg), rel=0.03)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("blur", "size", "angle_deg", "rows", "noise"),
     [
@@ -136,6 +140,7 @@ def test_the_standard_error_is_how_far_chance_moves_mtf50(blur, size, angle_deg,
     assert 0.5 <= np.mean(off < errors) <= 0.85
 
 
+@pytest.mark.thorough
 def test_noise_that_grows_with_the_light_is_counted_where_it_is():
     """Photons: the bright side is noisier. Error and scatter of 60 photographs agree to a third, as above."""
     rng = np.random.default_rng(3)

@@ -52,6 +52,7 @@ def cell(source, **output):
 # The edition ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sampled(4)
 @EACH
 def test_every_question_is_followed_by_its_key(path):
     cells = made(path).cells
@@ -139,6 +140,7 @@ def folder(tmp_path_factory):
     return out
 
 
+@pytest.mark.thorough
 def test_an_executed_edition_has_pictures_and_every_solution_is_right_in_it(folder, capsys):
     notebook = notebooks.read(folder / DISTORTION.name)
     shown = [one for one in notebook.cells if panels.panels(one)]
@@ -207,6 +209,7 @@ def test_pictures_of_the_lessons_come_along(folder):
 # Sheets --------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.by_example
 @EACH
 def test_the_sheets_hold_every_exercise_and_the_quiz_and_load_nothing(path):
@@ -313,6 +316,7 @@ def test_markdown_becomes_html_without_addresses():
 # The page for 90 minutes ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sampled(4)
 @EACH
 def test_the_one_page_says_what_the_lesson_says(path):
     """Its minutes are the plan's, its votes two of the lesson's, and its first sentence the lesson's question."""
@@ -338,6 +342,7 @@ def test_the_one_page_names_the_values_that_a_visualizer_opens_with():
     assert f"Set {set_to}. Move show, {moved}." in page
 
 
+@pytest.mark.sampled(6)
 @EACH
 def test_the_one_page_calls_controls_what_stands_on_them(path):
     """Only formulas of the questions have an underscore; `focal_mm` is "focal length f" on the screen."""

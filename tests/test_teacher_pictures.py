@@ -55,6 +55,7 @@ def titles(panel):
 # What a view shows is on its slides ----------------------------------------------------------------------------------
 
 
+@pytest.mark.sampled(4)
 @EACH
 def test_every_panel_of_every_picture_is_seen_once_and_together(path):
     views = [one for one in map(panels.panels, notebooks.read(path).cells) if one]
@@ -207,6 +208,7 @@ def decoded(data):
     return cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
 
 
+@pytest.mark.sampled(4)
 @EACH
 def test_no_picture_of_an_unsolved_lesson_is_black_or_empty(path):
     notebook = notebooks.read(path)

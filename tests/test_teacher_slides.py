@@ -28,6 +28,7 @@ def words(slide):
     return len(re.sub(r"<[^>]*>", " ", text).split())
 
 
+@pytest.mark.sampled(4)
 @EACH
 def test_every_question_is_followed_by_its_key(path):
     found = made(path)
@@ -59,6 +60,7 @@ def test_a_slide_has_one_idea_in_few_words(path):
             assert 0 < len(said.split()) <= slides.HEADING_WORDS + 2
 
 
+@pytest.mark.sampled(4)
 @EACH
 def test_a_deck_loads_nothing_and_names_no_other_address(path):
     page = deck.deck(notebooks.read(path))

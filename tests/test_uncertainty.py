@@ -136,6 +136,7 @@ def mrcals(corners, tmp_path_factory):
     return json.loads(done.stdout)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("distance", [inf, 1.0, 0.3])
 def test_covariance_is_mrcals_all_over_the_image(corners, mrcals, distance) -> None:
     """The whole covariance, at infinity and near by, to 0.5 % of its size at every pixel of a 12 × 9 grid."""
@@ -250,6 +251,7 @@ def test_pictures_of_two_sizes_are_not_compared() -> None:
 FISHEYE = Camera(Intrinsics(640, 480, 300.0, 300.0, 320.0, 240.0), KannalaBrandt(0.02, -0.005, 1e-3, -5e-4))
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize(
     ("cameras", "distance", "estimated", "warp"),
     [

@@ -508,6 +508,7 @@ async def status(reader):
     return int(head.split()[1])
 
 
+@pytest.mark.thorough
 def test_ten_thousand_requests_of_one_client_are_refused_and_take_no_memory(room):
     """One token is slowed down after its thirty; a classroom's address after its thousands; both are few numbers."""
     limits = Limits()

@@ -100,7 +100,7 @@ def view_beside():
     return namespace["bent"]
 
 
-@pytest.mark.parametrize("show", ["distorted", "undistorted"])
+@pytest.mark.parametrize("show", [pytest.param("distorted", marks=pytest.mark.thorough), "undistorted"])
 def test_each_slip_of_the_pen_in_distort_changes_the_wall_in_each_mode(says, view_beside, show):
     """Signs, factors, powers, axes, terms: each small change of the solution makes another picture, or none at all."""
     says("The lens bends the left picture, and your `distort` bends the right one: the two should look alike")

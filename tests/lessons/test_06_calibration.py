@@ -219,6 +219,7 @@ def test_fx_is_far_off_with_boards_held_flat_and_another_throw_says_another_thin
         assert calibrated(tilt=2.0, draw=draw).rms == pytest.approx(0.27, abs=0.005)
 
 
+@pytest.mark.thorough
 def test_fx_over_fifty_throws(says):
     """By the visualizer's own estimates, which the test above holds against SciPy's."""
     least, most = says("Over all fifty throws it runs from about 340 to about 780.")

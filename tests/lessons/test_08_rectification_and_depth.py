@@ -442,6 +442,7 @@ def searches():
     return costs, bike
 
 
+@pytest.mark.thorough
 def test_what_the_census_transform_keeps_in_another_light(says, searches):
     high, wide = says("Two costs look for each pixel's partner in blocks of 9 × 9 pixels")
     assert high == BLOCK

@@ -294,6 +294,7 @@ BOARD = np.stack([*np.meshgrid(0.1 * np.arange(9.0), 0.1 * np.arange(6.0)), np.z
 TRUE_F = F[0] * 640 / 1024
 
 
+@pytest.mark.thorough
 def test_the_model_of_lesson_05_fits_the_corners_and_is_wrong_beyond(says, found):
     (rms_said,) = says("The RMS error is 0.20 px.")
     (reached,) = says("The fit is held by corners as far as 62° from the axis.")

@@ -620,6 +620,7 @@ def commands():
     return sorted(re.findall(r"`camviz ([^`]+)`", text))
 
 
+@pytest.mark.thorough
 def test_the_commands_of_the_lesson_run_as_they_are_written(tmp_path, monkeypatch, samples):
     monkeypatch.chdir(tmp_path)
     calibrate, reproject = commands()

@@ -121,6 +121,7 @@ def test_most_of_the_error_comes_from_the_light(says, edge):
     assert wide.error.light < measured.light / 10
 
 
+@pytest.mark.thorough
 def test_four_times_the_rows_halve_the_error(says, thorough):
     says("The ± falls with the root of the edge's length: four times the rows, half the error.")
     rng = np.random.default_rng(2)
@@ -159,6 +160,7 @@ def test_what_the_standard_of_2014_does_otherwise(says):
     np.testing.assert_allclose(spread[flat], 8 * np.diff(rise)[flat])
 
 
+@pytest.mark.thorough
 def test_how_long_an_edge_must_be(says, thorough):
     noise, rows, within, sharp_rows = says(
         "At 2 % noise, 80 rows are within 3 % nearly always for a lens of usual sharpness. A very sharp one needs 200 "

@@ -40,6 +40,7 @@ def seeds(thorough):
     return range(50 if thorough else 1)
 
 
+@pytest.mark.sampled(40)
 @EACH
 def test_no_wrong_function_is_accepted_and_each_is_answered_by_its_own_reply(one, seeds):
     assert len(one.misconceptions) >= ADVERSARIES

@@ -82,6 +82,7 @@ ONCE_ACCEPTED = {
 }
 
 
+@pytest.mark.sampled(6)
 @pytest.mark.parametrize("what", ONCE_ACCEPTED)
 def test_it_is_refused_at_every_seed(what, thorough):
     name, function = ONCE_ACCEPTED[what]

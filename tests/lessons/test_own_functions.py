@@ -1,7 +1,7 @@
 """What a reader writes makes the picture: a wrong function gives a visibly other one (with --all three). Nothing stops.
 
 The lesson is run once with its solutions, and every check accepts them. Then each exercise's function is replaced by a
-wrong one, and what depends on it is run again to the lesson's end. Without --all, in lessons 05 and 16.
+wrong one, and what depends on it is run again to the lesson's end. Without --all, in lesson 05.
 """
 
 import re
@@ -147,7 +147,7 @@ def count_what_shows(path, monkeypatch, wanted: int) -> None:
 # Two classes, so that two workers share the lessons.
 
 
-@pytest.mark.by_example
+@pytest.mark.thorough
 class TestEveryOtherLesson:
     @pytest.mark.parametrize("path", PATHS[::2], ids=lambda path: path.stem)
     def test_wrong_functions_make_another_picture(self, path, monkeypatch, thorough):

@@ -30,7 +30,7 @@ BOARD = Board(9, 6, 0.03)
 CAMERA = Camera(Intrinsics(640, 480, 544, 546, 325, 233), BrownConrady(-0.12, 0.06, 3e-4, -2e-4))
 FRAMES, RATE, NOISE = 120, 30.0, 0.15
 CASES = ((0.02, 0.4), (0.02, 0.7), (0.02, 1.4), (0.005, 0.7), (0.0, 0.7))  # seconds of read-out, and between stops
-FILMS = ((0.02, 0.7), (0.0, 0.7))
+FILMS = ((0.02, 0.7), (0.005, 0.7), (0.005, 1.4), (0.0, 0.7))
 
 
 @dataclass(frozen=True)
