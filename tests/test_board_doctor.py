@@ -145,6 +145,7 @@ def test_a_known_baseline_tells_inches_from_millimetres():
     assert told[0].option == f"--square-mm {1000 * set_up.board.square_size:g}"
 
 
+@pytest.mark.thorough
 def test_a_search_that_does_not_end_is_ended_and_its_picture_named(tmp_path):
     """In the second picture, full of squares, the search takes 15 s; the process that takes over finds the third's."""
     board = Board(columns=9, rows=6, square_size=0.02)

@@ -89,7 +89,7 @@ def test_cameras_that_hardly_turn_are_not_tied():
         calibrate_boards(truth.observed(rng), truth.boards)
 
 
-@pytest.mark.sampled(1)
+@pytest.mark.thorough
 @pytest.mark.parametrize("factor", [0.984, 1.01])
 def test_a_board_that_was_printed_in_another_size_is_measured(factor):
     rng = np.random.default_rng(3)
@@ -132,7 +132,7 @@ def test_a_known_place_is_kept_and_makes_the_cameras_better():
     assert either[1] < either[0]
 
 
-@pytest.mark.sampled(1)
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["marker0", "marker1"])
 def test_a_marker_that_is_taken_for_another_is_set_aside_and_the_rest_stays(name):
     rng = np.random.default_rng(5)
@@ -171,6 +171,7 @@ def test_boards_parallel_to_the_sensor_leave_the_focal_length_without_deviation(
     assert "± not known" in inspection.as_text()
 
 
+@pytest.mark.thorough
 def test_a_file_without_corners_tells_by_its_covariance_what_was_not_decided(parallel, tmp_path):
     _, found = parallel
     write(found.calibration, tmp_path / "camera.yaml", "opencv")

@@ -166,6 +166,7 @@ def test_a_wheel_that_cannot_be_had_leaves_one_sentence_and_no_zip(checkout, tmp
     assert list((tmp_path / "out").iterdir()) == []
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGTERM")
 def test_a_bundle_that_is_ended_while_it_fetches_leaves_nothing_and_pip_ends_too(tmp_path):
     """The index is a server that never answers."""

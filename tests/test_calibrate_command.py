@@ -146,6 +146,7 @@ def test_a_full_disk_leaves_what_was_there(room):
 LISTEN = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.skipif(os.name == "nt", reason="sends Ctrl-C to a group of processes")
 @pytest.mark.parametrize("stage", ["detection", "solving"])
 def test_ctrl_c_ends_with_130_and_writes_nothing(room, stage):

@@ -74,6 +74,7 @@ def test_the_pages_list_the_lesson_in_its_place_and_nothing_else_is_written(less
     assert f"*Lesson [{NUMBER}](../lessons/{NUMBER}_shadows.ipynb).*" in lesson.text("docs/glossary.md")
 
 
+@pytest.mark.thorough
 def test_the_check_of_the_lesson_finds_nothing_wrong_and_says_what_is_still_lacking(lesson):
     said = lesson.run("-m", "camviz_school.commands.lessons", "check", NUMBER, status=1)
     assert {line.partition(": ")[2] for line in said.splitlines()} == {
@@ -92,6 +93,7 @@ def test_the_check_of_the_lesson_finds_nothing_wrong_and_says_what_is_still_lack
     }
 
 
+@pytest.mark.thorough
 def test_the_lesson_s_question_and_exercise_are_asked_and_answered(lesson):
     code = """
 import json

@@ -39,9 +39,10 @@ SLOW = (  # a rig's; tests/test_rig_findings.py names four kinds in smaller ones
 )
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.thorough] if name in SLOW else []) for name in FAULTS]
-)
+EACH = [pytest.param(name, marks=[pytest.mark.thorough] if name in SLOW else []) for name in FAULTS]
+
+
+@pytest.mark.parametrize("name", EACH)
 def test_a_fault_is_named_at_the_strength_that_is_promised(name):
     fault = FAULTS[name]
     assert found(name, fault.promised)
@@ -178,7 +179,7 @@ def test_no_sentence_about_a_finding_is_longer_than_a_reader_keeps_in_mind():
     assert {sentence for sentence, count in words.items() if count > LONGEST_SENTENCE} == set()
 
 
-@pytest.mark.parametrize("name", FAULTS)
+@pytest.mark.parametrize("name", EACH)
 def test_what_an_inspection_says_is_short_and_begins_with_the_claim(name):
     for finding in found(name, FAULTS[name].promised):
         assert all(len(sentence.split()) <= LONGEST_SENTENCE for sentence in sentences(finding.sentence))

@@ -244,6 +244,7 @@ def test_greedy_choice_is_near_the_best_of_all_choices():
     assert mean_variance(chosen) < 0.6 * np.median(every)
 
 
+@pytest.mark.thorough
 def test_of_several_boards_the_frames_are_chosen_by_which_cameras_and_places_are_known_best():
     def mean_sigma(places):
         some = {

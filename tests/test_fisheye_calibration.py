@@ -76,6 +76,7 @@ def test_rays_land_where_the_true_fisheye_has_them(solved):
     assert off.max() < 1
 
 
+@pytest.mark.thorough
 def test_focal_length_and_middle_come_back(solved):
     truth = TUM_VI.intrinsics
     assert solved.intrinsics.fx == pytest.approx(truth.fx, rel=1e-3)

@@ -176,7 +176,7 @@ def seen_badly_along_the_optical_axis(rng, true, turn=0.002, across=0.0005, alon
     return RigidTransform.from_components(boards.translation + shift, turned)
 
 
-@pytest.mark.sampled(1)
+@pytest.mark.thorough
 @BOTH
 def test_poses_of_a_board_whose_distance_is_seen_badly_give_x_by_their_directions(eye_to_hand):
     """X is nearer than where all counts alike, in 12 cells, and the sizes of turn and distance are found."""
@@ -199,6 +199,7 @@ def test_poses_of_a_board_whose_distance_is_seen_badly_give_x_by_their_direction
     assert 0.6 < np.sqrt(np.mean(np.square(z))) < 1.5
 
 
+@pytest.mark.thorough
 def test_where_all_errors_are_alike_weighing_them_changes_next_to_nothing():
     """Sizes that are learnt cost little where there is nothing to learn."""
     plain, learnt = [], []
@@ -230,6 +231,7 @@ def test_lengths_in_any_unit_are_brought_to_the_robots(eye_to_hand, factor):
     assert np.linalg.norm(off(given, true)[3:]) > 0.1
 
 
+@pytest.mark.thorough
 def test_a_camera_without_its_distortion_is_not_blamed_on_the_robot():
     """Corners of pictures that were not solved from lie nearer than where all but their own scatter is the robot's."""
     learnt, blamed = [], []

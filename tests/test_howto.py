@@ -9,13 +9,13 @@ import pytest
 
 
 @pytest.fixture(scope="module")
-def files(tmp_path_factory):
+def files(tmp_path_factory, thorough):
     folder = tmp_path_factory.mktemp("examples")
-    examples.write(folder)
+    (examples.write if thorough else examples.write_of_one_and_two)(folder)
     return folder
 
 
-LONG = (  # a quarter of a minute or more each: with --all
+LONG = (  # a quarter of a minute or more each, or of more than two cameras: with --all
     "calibrate-a-camera",
     "calibrate-a-pair",
     "calibrate-a-rig",

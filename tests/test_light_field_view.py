@@ -86,6 +86,7 @@ def test_openings_blur_a_view_by_its_slope_and_leave_what_is_in_focus():
     assert np.abs(sharp).mean() > 1.15 * np.abs(blurred).mean()
 
 
+@pytest.mark.thorough
 def test_the_band_of_exact_refocusing_is_drawn_where_it_ends():
     """|d| ≤ 1 px with openings that fill the lens, 2 px with openings half as wide; pinholes have no end."""
     assert "exact" not in LightFieldView().figure(draft=True).body

@@ -289,6 +289,7 @@ def opened(scene, camera, baseline, focus, width):
     return Openings(photograph_field(scene, camera, 3, 3, baseline, focus, encoded=True), scene, camera).opened(width)
 
 
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize(("depth", "width"), [(2.5, 1.0), (4.0, 1.0), (2.2, 0.7)])
 def test_a_view_through_an_opening_is_the_mean_of_what_its_places_see(depth, width):
     """A flat picture, in linear light; a pinhole's picture is farther off wherever there is blur."""

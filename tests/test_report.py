@@ -83,6 +83,7 @@ def test_every_link_inside_the_page_leads_somewhere(page):
     assert len(parts.ids) == len(set(parts.ids))
 
 
+@pytest.mark.sampled(2)
 def test_every_view_of_a_finding_has_its_anchor_whatever_was_found(page):
     _, _, parts = page
     assert {f"view-{kind.view}" for kind in kinds().values()} <= set(parts.ids)

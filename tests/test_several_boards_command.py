@@ -33,6 +33,15 @@ def room(wall, monkeypatch):
     return BEFORE_WALL
 
 
+@pytest.fixture
+def empty_room(tmp_path, monkeypatch):
+    """Pictures that show nothing."""
+    monkeypatch.chdir(tmp_path)
+    Path("wall/cam0").mkdir(parents=True)
+    for number in range(3):
+        cv2.imwrite(f"wall/cam0/{number}.png", np.full((480, 640), 200, np.uint8))
+
+
 def stands(said, name):
     """How far something stands, and σ of it, in mm."""
     line = next(line for line in said.splitlines() if line.startswith(f"{name} stands "))
@@ -56,6 +65,7 @@ def test_two_cameras_and_the_markers_of_a_wall_are_placed_told_of_and_written(ro
     assert "<html" in Path("rig.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.thorough
 def test_places_that_were_written_are_read_and_held(room, capsys):
     words = ["calibrate", "wall/cam0", "--fix", "k3", "--workers", "1", "-o"]
     assert main([*words, "camera.yaml", "--boards", "wall.toml", "--places", "solved.toml"]) == 0
@@ -110,10 +120,10 @@ def test_films_of_several_boards_give_frames_by_which_cameras_and_markers_are_pl
         ),
         (FILE, ["--board", "9x6"], "--boards says which boards there are, all flat: leave --board out"),
         (FILE, ["--board-warp", "on"], "leave --board-warp on out"),
-        (FILE.replace("4X4", "6X6"), [], "camera: none of the boards door, shelf, lamp, desk is in its 10 pictures"),
+        (FILE.replace("4X4", "6X6"), [], "camera: none of the boards door, shelf, lamp, desk is in its 3 pictures"),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_sentence(room, capsys, text, words, why):
+def test_what_cannot_be_is_refused_in_one_sentence(empty_room, capsys, text, words, why):
     if text is not None:
         Path("bad.toml").write_text(text, encoding="utf-8")
     file = "none.toml" if text is None else "bad.toml"
@@ -123,7 +133,7 @@ def test_what_cannot_be_is_refused_in_one_sentence(room, capsys, text, words, wh
     assert len(said.strip().splitlines()) == 1
 
 
-def test_places_are_for_several_boards(room, capsys):
+def test_places_are_for_several_boards(empty_room, capsys):
     assert main(["calibrate", "cam0", "--board", "9x6", "--square-mm", "20", "--places", "out.toml"]) == 2
     assert "--places is for several boards: name them with --boards." in capsys.readouterr().err
 

@@ -182,6 +182,7 @@ def test_a_finding_names_its_camera_once():
     assert "left: left" not in words
 
 
+@pytest.mark.thorough
 def test_no_view_has_a_control_called_as_a_chooser_above_it():
     live = LiveInspection(inspect(pair()))
     assert {live._view.description, live._camera.description} == {LOOK, CAMERA}

@@ -104,6 +104,7 @@ def test_a_lesson_without_a_plan_has_its_keys_all_the_same(monkeypatch):
     assert set(sheets.sheets(notebooks.read(DISTORTION), "05", [])) == {"exercises", "marking"}
 
 
+@pytest.mark.sampled(4)
 @EACH
 def test_all_that_is_the_teacher_s_can_be_taken_out_by_its_tags(path):
     """As docs/teaching.md has nbgrader do it before a lesson is handed out."""
@@ -153,6 +154,7 @@ def test_an_executed_edition_has_pictures_and_every_solution_is_right_in_it(fold
     assert "widget-view" not in (folder / DISTORTION.name).read_text(encoding="utf-8")
 
 
+@pytest.mark.thorough
 def test_the_folder_holds_what_the_help_promises(folder, capsys):
     names = {path.name.partition("_")[2] for path in folder.glob("05_*.html")}
     assert names == {"plan.html", "one_page.html", "exercises.html", "marking.html", "slides.html"}
@@ -264,6 +266,7 @@ def test_points_follow_what_is_right_in_an_answer(exercise, name, points):
     assert found.keeps == points
 
 
+@pytest.mark.thorough
 def test_no_wrong_answer_keeps_all_points_and_every_known_thought_keeps_some():
     for path in LESSONS:
         for exercise in exercises(path.name[:2]).values():
@@ -360,6 +363,7 @@ def test_a_view_that_another_cell_has_named_is_known_by_its_class():
 # The plan and the slides ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sampled(6)
 @EACH
 def test_a_plan_numbers_the_slides_as_the_deck_does(path):
     """The numbers of the printed plan, read back: every slide once, in a step or among those to skip."""

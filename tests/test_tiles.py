@@ -55,6 +55,7 @@ def test_words_stand_free_at_both_ends_of_every_control(name):
             assert tile.words or len(tiles) == 1 or problems(tile, unit_on_a_telephone(tile)) == []
 
 
+@pytest.mark.sampled(12)
 @pytest.mark.parametrize("name", STATES)
 def test_the_tiles_of_a_row_fill_it_and_none_covers_another(name):
     cells = [tile.cell for tile in STATES[name]().figure().tiles]

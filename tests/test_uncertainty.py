@@ -152,6 +152,7 @@ def test_covariance_is_mrcals_all_over_the_image(corners, mrcals, distance) -> N
     assert np.abs((covariance - theirs)[inside] / size[inside, None, None]).max() < 0.005
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("weighted", [False, True])
 @pytest.mark.parametrize("distance", [inf, 1.0])
 def test_difference_is_mrcals(mrcals, distance, weighted) -> None:

@@ -49,7 +49,7 @@ def photographs(board, folder):
     return paths
 
 
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize("kind", SHOWN)
 def test_a_board_that_was_not_asked_for_is_named_with_the_options_that_ask_for_it(kind, taken):
     _, said = SHOWN[kind]

@@ -75,7 +75,19 @@ cam0:
 
 
 def write(folder: Path) -> None:
-    """left/, right/, later/, knocked/, rig/ and phone/ show a board, wall/ several, two files are solved from them."""
+    """All of it."""
+    write_of_one_and_two(folder)
+    shoot_rig(folder / "rig")
+    shoot_wall(folder / "wall")
+    own = np.random.default_rng(20)
+    shoot(folder / "phone", LEFT, spread_boards(own, (LEFT,), SHEET, 10, (15, 40)), own, SHEET)
+    robot(folder)
+    film(folder / "film.avi")
+    rolling_film(folder / "rolling.avi")
+
+
+def write_of_one_and_two(folder: Path) -> None:
+    """left/, right/, later/ and knocked/ show a board, two files are solved from them, and what needs no board."""
     rng = np.random.default_rng(18)
     together, later = (spread_boards(rng, seen_by, BOARD, VIEWS, (15, 40)) for seen_by in ((LEFT, RIGHT), (KNOCKED,)))
     shoot(folder / "left", LEFT, together, rng)
@@ -91,13 +103,6 @@ def write(folder: Path) -> None:
     around = photograph(textured_scene(), equirectangular_camera(256, 128))
     cv2.imwrite(str(folder / "around.png"), around[..., ::-1])
     expose(folder / "frames", rng)
-    shoot_rig(folder / "rig")
-    shoot_wall(folder / "wall")
-    own = np.random.default_rng(20)
-    shoot(folder / "phone", LEFT, spread_boards(own, (LEFT,), SHEET, 10, (15, 40)), own, SHEET)
-    robot(folder)
-    film(folder / "film.avi")
-    rolling_film(folder / "rolling.avi")
 
 
 def shoot(

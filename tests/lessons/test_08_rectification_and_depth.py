@@ -467,6 +467,7 @@ def test_four_neighbours_by_hand(says):
     assert list(before < float(middle.value)) == list(after < 0.8 * float(middle.value)) == [True, False, True, False]
 
 
+@pytest.mark.thorough
 def test_leaving_out_what_is_least_sure(says, searches):
     says("Leave out the fifth of which the matcher is least sure, and three in four mistakes are gone.")
     costs, bike = searches

@@ -316,6 +316,7 @@ def test_the_model_of_lesson_05_fits_the_corners_and_is_wrong_beyond(says, found
     assert miss(reached.value + 8) + TRUE_F * g(np.radians(70)) < -320  # to the left of the picture: it should be right
 
 
+@pytest.mark.thorough
 def test_two_coefficients_are_enough(says, found):
     says("From none to two, each coefficient lowers the error. The third and the fourth do not.")
     says("with all four, the curve leaves the truth sooner where no corner holds it")

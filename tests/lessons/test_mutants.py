@@ -8,7 +8,7 @@ from mutation import mutants
 from test_exercises import EACH, HELD
 
 
-@pytest.mark.sampled(24)
+@pytest.mark.sampled(12)
 @EACH
 def test_every_mutant_of_the_solution_is_refused_or_named_as_equivalent(one, thorough):
     seeds = range(50 if thorough else 1)
