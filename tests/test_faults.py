@@ -60,7 +60,6 @@ def test_nothing_is_found_in_a_healthy_camera(seed):
     assert alarms(Evidence(healthy(np.random.default_rng(seed)))) == []
 
 
-@pytest.mark.sampled(1)
 @pytest.mark.parametrize("seed", [20_100, 20_101])
 def test_nothing_is_found_in_a_healthy_pair(seed):
     assert alarms(Evidence(healthy_pair(np.random.default_rng(seed)))) == []

@@ -14,6 +14,7 @@ import camviz_clinic
 from camviz.cameras import Camera, Intrinsics
 from camviz.distortion import valid_region
 from camviz.lenses import BrownConrady, Equidistant, KannalaBrandt, Orthographic, Perspective
+from camviz.poses import RigidTransform
 from camviz_clinic.calibration import Detections, calibrate, calibrate_pair, detect
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.checks import Inspection, inspect, inspect_file, kinds
@@ -21,6 +22,7 @@ from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.fields import smooth_field, warp_columns
 from camviz_clinic.checks.findings.boards import coverage, held_out_ratio
 from camviz_clinic.checks.observed import explained, parameter_columns
+from camviz_clinic.checks.rig import fits_better
 from camviz_clinic.checks.virtual import single
 from camviz_clinic.commands.command import main
 from camviz_clinic.files import Board, CalibrationError
@@ -350,6 +352,21 @@ def test_a_rotation_that_is_mended_is_the_nearest_one(tmp_path):
     path.write_text(yaml.safe_dump(tree))
     mended = inspect_file(path).calibration.cameras["cam1"].cam_from_world
     np.testing.assert_allclose(mended.rotation.as_matrix(), R, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("as_it_is", "changed", "better"),
+    [
+        (0.101, 0.02, True),
+        (0.099, 0.02, False),  # less than five times nearer
+        (2.0, 0.199, True),
+        (2.0, 0.201, False),  # not near
+    ],
+)
+def test_another_reading_of_a_transform_must_be_five_times_nearer_and_near(as_it_is, changed, better):
+    """Distances in lengths of the transform that is known."""
+    known, ours, other = (RigidTransform.from_translation([0.1 * (1 + off), 0, 0]) for off in (0, as_it_is, changed))
+    assert fits_better(ours, known, lambda _: other) == better
 
 
 def test_a_positive_p03_of_ros_is_a_baseline_of_the_wrong_sign(tmp_path):

@@ -211,6 +211,21 @@ def test_nothing_jumps_on_a_phone_while_the_first_picture_comes_to_life(browser:
     page.close()
 
 
+@pytest.mark.parametrize("width", [1200, 1440, 1920])
+def test_a_lesson_stands_where_it_will_before_the_list_of_its_sections_comes(
+    browser: Browser, address: str, width: int
+) -> None:
+    """The list is the last part of the page's HTML to arrive."""
+    page = new_page(browser, viewport={"width": width, "height": 900})
+    page.goto(f"{address}/lessons/05_distortion.html")
+    box = "document.querySelector('.bd-article-container').getBoundingClientRect().toJSON()"
+    whole = page.evaluate(box)
+    page.evaluate("document.querySelector('.bd-sidebar-secondary').remove()")
+    waiting = page.evaluate(box)
+    assert (waiting["x"], waiting["width"]) == (whole["x"], whole["width"])
+    page.close()
+
+
 @pytest.mark.parametrize("width", [375, 1440])
 def test_a_pane_is_as_high_before_it_comes_to_life_as_after(browser: Browser, address: str, width: int) -> None:
     """The panes of lesson 16 in order: first no recording comes, then all do. Some have words among their pictures."""

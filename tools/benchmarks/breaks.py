@@ -1,4 +1,4 @@
-"""Thirty breaks on purpose, in every room of the house: which tests of the short run find each.
+"""Breaks on purpose, in every room of the house: which tests of the short run find each.
 
     python tools/benchmarks/breaks.py [--all] [a word of the break …]
 
