@@ -76,8 +76,8 @@ def test_no_light_is_lost_between_hole_and_wall(hole):
 def test_the_rule_of_thumb_holds_the_share_of_light_of_an_airy_disc(hole):
     share = light_within(float(optics.pinhole_blur_mm(hole, 50)) / 2, hole, 50)
     assert 0.78 < share < 1.0
-    if hole < 0.1:
-        assert share == pytest.approx(0.838, abs=0.01)
+    if hole < 0.4:  # up to the best hole and beyond; a shadow and an Airy disc added as lengths would hold 0.86 to 0.91
+        assert share == pytest.approx(0.838, abs=0.02)
 
 
 @pytest.mark.parametrize("focal", [15.0, 50.0, 120.0])
