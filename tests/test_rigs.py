@@ -186,6 +186,9 @@ def test_a_chain_takes_the_links_that_place_it_best():
     np.testing.assert_allclose(placed["c"].as_matrix(), ab.as_matrix() @ bc.as_matrix(), atol=1e-12)
     links["a", "c"] = link("a", "c", wrong, 0.0014)  # less than √2 mm
     assert chained(["a", "b", "c"], links)["c"].translation.tolist() == [9, 9, 9]
+    links = {("a", "c"): link("a", "c", ab, 0.001), ("b", "c"): link("b", "c", bc, 0.001)}  # to b against its link
+    expected = ab.as_matrix() @ np.linalg.inv(bc.as_matrix())
+    np.testing.assert_allclose(chained(["a", "b", "c"], links)["b"].as_matrix(), expected, atol=1e-12)
 
 
 def test_one_frame_in_common_has_the_deviation_of_its_corners():
