@@ -29,6 +29,7 @@ from camviz.lenses import BrownConrady, KannalaBrandt
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration import Board, CannotCalibrate, Detections
+from camviz_clinic.calibration.boards.charuco import FEWEST
 from camviz_clinic.calibration.detection import seen
 from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.findings import rig as checks
@@ -104,18 +105,23 @@ def calibrated_by_opencv(
 ) -> dict[str, Camera] | None:
     """The cameras of cv2.calibrateMultiview from the same corners; None where it raises or gives no numbers.
 
-    It has the views of whole boards only. Corners that were not seen may be given as (-1, -1) by its documentation,
-    but OpenCV 5.0.0 takes them for corners. `held` are cameras whose intrinsics and lens it takes as they are.
+    Of a frame it has the corners that all its cameras see, some twice in the place of the others. Corners that were not
+    seen may be given as (-1, -1) by its documentation, but OpenCV 5.0.0 takes them for corners. `held` are cameras
+    whose intrinsics and lens it takes as they are.
     """
-    found = {name: each.only(np.flatnonzero(seen(each.corners).all(axis=1))) for name, each in found.items()}
     frames = sorted({place for each in found.values() for place in each.places})
-    corners = board.corners.astype(np.float32)
-    nothing = np.zeros((1, len(corners), 2), np.float32)
-    images, mask = [], np.zeros((len(found), len(frames)), np.uint8)
-    for number, each in enumerate(found.values()):
-        at = dict(zip(each.places, each.corners.astype(np.float32)[:, None], strict=True))
-        images.append([at.get(frame, nothing) for frame in frames])
-        mask[number] = [frame in at for frame in frames]
+    views = {name: dict(zip(each.places, each.corners, strict=True)) for name, each in found.items()}
+    points, images, mask = [], [[] for _ in found], np.zeros((len(found), len(frames)), np.uint8)
+    for column, frame in enumerate(frames):
+        views_of_it = [each[frame] for each in views.values() if frame in each]
+        common = np.flatnonzero(seen(np.stack(views_of_it)).all(axis=0))
+        enough = len(common) >= FEWEST and np.linalg.matrix_rank(np.diff(board.corners[common], axis=0)) > 1
+        which = np.resize(common if enough else np.arange(len(board.corners)), len(board.corners))
+        points.append(board.corners[which].astype(np.float32))
+        for row, each in enumerate(views.values()):
+            mask[row, column] = enough and frame in each
+            image = each[frame][which] if mask[row, column] else np.zeros((len(which), 2))
+            images[row].append(image.astype(np.float32)[None])
     sizes = [(each.width, each.height) for each in found.values()]
     kinds = np.array([int(models[name] == "fisheye") for name in found], np.uint8)
     flags = np.where(kinds, cv2.CALIB_RECOMPUTE_EXTRINSIC | cv2.CALIB_FIX_SKEW, 0).astype(np.int32)
@@ -125,7 +131,7 @@ def calibrated_by_opencv(
     guess = cv2.CALIB_USE_INTRINSIC_GUESS if held else 0
     try:
         _, matrices, lenses, turns, shifts = cv2.calibrateMultiview(
-            [corners] * len(frames), images, sizes, mask, kinds, K, D, nobody, nobody, flags, guess
+            points, images, sizes, mask, kinds, K, D, nobody, nobody, flags, guess
         )
     except cv2.error:
         return None

@@ -17,9 +17,9 @@ of corners within WILD pixels in the solutions of all programs, which a wrongly 
 A program fails in a fold in which it gives no rig, or one that is off by more than WILD pixels in the median. Such a
 program has no number, and has no say in which corners are kept.
 
-OpenCV solves for each camera by all its corners (calibrateCamera) and for their places by the views of whole boards:
-its documentation has missing corners given as (-1, -1) to calibrateMultiview, but 5.0.0 takes these for corners. One of
-them in 720 moves the focal length of a virtual camera from 900 to 171 pixels.
+OpenCV solves for each camera by all its corners (calibrateCamera), and for their places by the corners that all cameras
+of a frame see (calibrateMultiview). Its documentation has missing corners given to the latter as (-1, -1), but 5.0.0
+takes these for corners: one of them in 720 moves the focal length of a virtual camera from 900 to 171 pixels.
 """
 
 from __future__ import annotations
@@ -197,7 +197,7 @@ def rig_by_camviz(found: Found, board: Board) -> Rig:
 
 
 def rig_by_opencv(found: Found, board: Board) -> Rig:
-    """cv2.calibrateCamera by all corners, and cv2.calibrateMultiview by whole boards."""
+    """cv2.calibrateCamera by all corners, and cv2.calibrateMultiview by those that all cameras of a frame see."""
     held = {name: by_opencv(each, board, MODEL) for name, each in found.items()}
     rig = calibrated_by_opencv(found, board, dict.fromkeys(found, MODEL), held)
     if rig is None:
