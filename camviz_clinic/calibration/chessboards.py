@@ -169,7 +169,7 @@ def crossed(gray: NDArray[Any], corners: Array, board: Shape) -> bool:
     meets white, and number them with the others.
     """
     grid = corners.reshape(board.rows, board.columns, 2)
-    along, down = (NEAR * np.gradient(grid, axis=axis) for axis in (1, 0))
+    along, down = (NEAR * np.asarray(np.gradient(grid, axis=axis)) for axis in (1, 0))
     one = np.sort([_at(gray, grid + along + down), _at(gray, grid - along - down)], axis=0)
     other = np.sort([_at(gray, grid + along - down), _at(gray, grid - along + down)], axis=0)
     turns = np.where(np.add.outer(np.arange(board.rows), np.arange(board.columns)) % 2, -1, 1)
