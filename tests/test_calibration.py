@@ -22,6 +22,7 @@ from camviz_clinic.calibration import (
     calibrate_pair,
     detect,
     find_corners,
+    solving,
 )
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.chessboards import at_saddles
@@ -93,6 +94,24 @@ def test_the_corners_of_a_chessboard_are_found_in_the_boards_order_however_it_is
     for image, corners in (picture(BOARD, TILTED), turned(*picture(BOARD, TILTED))):
         found = find_corners(image, BOARD, finder)
         assert np.abs(found - corners).max() < (0.3 if finder in ("classic", "saddles") else 0.1)
+
+
+def test_a_chessboard_with_a_narrow_margin_is_not_found_along_its_edge():
+    """Sectors take places on the edge of its white margin for corners: in all these pictures, 19 to 81 px off."""
+    board, side, margin = Board(3, 4, 0.05), 60, 12
+    fields = np.add.outer(np.arange(5), np.arange(4)) % 2 * 255
+    flat = np.pad(fields.astype(np.uint8).repeat(side, axis=0).repeat(side, axis=1), margin, constant_values=255)
+    corners = margin - 0.5 + side * (1 + np.stack(np.meshgrid(np.arange(3), np.arange(4)), axis=-1).reshape(-1, 1, 2))
+    height, width = flat.shape
+    rng = np.random.default_rng(0)
+    for _ in range(10):
+        there = np.array([[100, 50], [200, 60], [190, 180], [95, 170]]) + rng.uniform(-25, 25, (4, 2))
+        outline = np.array([[0, 0], [width, 0], [width, height], [0, height]], np.float32)
+        H = cv2.getPerspectiveTransform(outline, there.astype(np.float32))
+        image = cv2.warpPerspective(flat, H, (320, 240), borderValue=56)
+        true = cv2.perspectiveTransform(corners, H)[:, 0]
+        found = find_corners(image, board)
+        assert min(np.abs(found - true).max(), np.abs(found[::-1] - true).max()) < 1
 
 
 def test_saddles_close_to_the_border_are_measured_in_a_smaller_window():
@@ -403,3 +422,24 @@ def test_the_joint_solution_of_a_pair_is_opencvs(photographs):
     np.testing.assert_allclose(found.cameras["left"].intrinsics.K, K, atol=2e-3)
     errors = np.concatenate(list(found.per_view_errors.values()))
     assert np.sqrt(np.mean(errors**2)) == pytest.approx(rms, abs=1e-5)
+
+
+def test_a_view_beyond_the_fold_of_the_lens_keeps_its_pose():
+    """Nothing can be fitted to corners without an image, and no warning says so on the way."""
+    camera = Camera(WIDE, BrownConrady(-0.3))  # it folds 450 pixels from the middle
+    found, poses = seen_by(camera, np.random.default_rng(1), views=4)
+    beyond = [1200, 900] + 0.1 * (found.corners[:1] - found.corners[0].mean(axis=0))
+    aside = RigidTransform.from_translation([2, 2, 0.3])
+    assert np.isnan(camera.project(aside.apply(BOARD.corners))).all()
+    corners = np.concatenate([found.corners, beyond])
+    silent = np.repeat([[False]] * 4 + [[True]], len(BOARD.corners), axis=1)
+    start = Adjustment(
+        BOARD,
+        {"camera": camera},
+        {"camera": corners},
+        RigidTransform.concatenate([*poses, aside]),
+        {"camera": ("fx", "fy")},
+        {"camera": silent},
+    )
+    solved = solving._settled(start)
+    np.testing.assert_allclose(solved.first_from_board[4].as_matrix(), aside.as_matrix())

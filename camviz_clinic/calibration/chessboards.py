@@ -22,6 +22,8 @@ MARGIN = 2.0  # of the widest squares: what of the picture is kept around the ou
 AGREE = 0.5  # of the narrowest square: further apart, rough and exact corners are not of the same squares
 THOROUGH = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_EXHAUSTIVE
 CONTRAST = 0.5  # of the board's own: fields beyond its edge that differ by more are squares
+NEAR = 0.25  # of a square: how far to either side of a corner the four fields that meet in it are looked at
+CROSSED = 0.95  # of the corners: where fewer are crossings, what was found is not the board
 WINDOW = 11  # pixels to either side of a corner that OpenCV's samples refine it from
 CLEAR = 0.4  # of the narrowest square: wider windows reach the edges that meet in the next corner
 LEAST_WINDOW = 2
@@ -36,6 +38,8 @@ def find_chessboard(gray: NDArray[Any], board: Shape, finder: str = "auto") -> A
     if min(board.columns, board.rows) < LEAST_SIDE:
         return None
     corners = _sectors(gray, board) if finder != "classic" else _classic(gray, board, WINDOW)
+    if corners is not None and finder != "classic" and not crossed(gray, corners, board):
+        corners = None
     if corners is None and finder in ("auto", "saddles"):
         corners = _classic(gray, board)
     if corners is not None and finder == "saddles":
@@ -151,12 +155,32 @@ def _black_first(gray: NDArray[Any], corners: Array, board: Shape) -> Array:
     middles = (grid[:-1, :-1] + grid[1:, 1:] + grid[:-1, 1:] + grid[1:, :-1]) / 4
     if not middles.size:
         return corners
-    u, v = np.moveaxis(np.rint(middles).astype(int), -1, 0)
-    seen = gray[v.clip(0, gray.shape[0] - 1), u.clip(0, gray.shape[1] - 1)].astype(float)
+    seen = _at(gray, middles)
     as_first = np.add.outer(np.arange(board.rows - 1), np.arange(board.columns - 1)) % 2 == 0
     first_is_white = seen[as_first].mean() > seen[~as_first].mean() if not as_first.all() else False
     other_end_differs = (board.columns + board.rows) % 2 == 1
     return corners[::-1].copy() if first_is_white and other_end_differs else corners
+
+
+def crossed(gray: NDArray[Any], corners: Array, board: Shape) -> bool:
+    """Whether two black fields and two white ones meet crosswise in nearly all of the corners (columns * rows, 2).
+
+    Around a board with a narrow margin, OpenCV's sectors take places on its edge for corners, where one black field
+    meets white, and number them with the others.
+    """
+    grid = corners.reshape(board.rows, board.columns, 2)
+    along, down = (NEAR * np.asarray(np.gradient(grid, axis=axis)) for axis in (1, 0))
+    one = np.sort([_at(gray, grid + along + down), _at(gray, grid - along - down)], axis=0)
+    other = np.sort([_at(gray, grid + along - down), _at(gray, grid - along + down)], axis=0)
+    turns = np.where(np.add.outer(np.arange(board.rows), np.arange(board.columns)) % 2, -1, 1)
+    brighter = turns * ((one[0] > other[1]).astype(int) - (other[0] > one[1]))
+    return bool(max(np.mean(brighter == 1), np.mean(brighter == -1)) >= CROSSED)
+
+
+def _at(gray: NDArray[Any], points: Array) -> Array:
+    """How bright (...) the pixels at points (..., 2) are, or those nearest to them where they lie outside."""
+    u, v = np.moveaxis(np.rint(points).astype(int), -1, 0)
+    return np.asarray(gray[v.clip(0, gray.shape[0] - 1), u.clip(0, gray.shape[1] - 1)], dtype=float)
 
 
 def goes_on(gray: NDArray[Any], corners: Array, board: Shape) -> bool:

@@ -39,8 +39,9 @@ def find_corners(image: NDArray[Any], board: Shape, finder: str = "auto") -> Arr
         image: (height, width) or (height, width, 3), grey or RGB, 8 bits.
         board: Board, what to look for.
         finder: {"auto", "sectors", "classic", "saddles"}, how a chessboard is found. "sectors" is OpenCV's
-            findChessboardCornersSB, "classic" is findChessboardCorners with cornerSubPix, "auto" the first of the two
-            that finds it. "saddles" refines the corners of "auto" by cornerSubPix, in a window clear of the next ones.
+            findChessboardCornersSB, "classic" is findChessboardCorners with cornerSubPix in OpenCV's window of 23
+            pixels, in which corners of narrow squares run together; "auto" is the first of the two that finds it, in a
+            window clear of the next ones. "saddles" refines the corners of "auto" in such a window.
 
     Returns:
         (columns * rows, 2) or None, pixels, NaN for points of a ChArUco board or of an AprilGrid that are not seen;

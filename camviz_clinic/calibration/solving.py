@@ -274,7 +274,10 @@ def _wanted(adjustment: Adjustment) -> list[Mask]:
 
 
 def _trimmed(adjustment: Adjustment, view: int) -> Adjustment:
-    """One view alone, its pose fitted to the better half of its corners (least trimmed squares, Rousseeuw 1984)."""
+    """One view alone, its pose fitted to the better half of its corners (least trimmed squares, Rousseeuw 1984).
+
+    Its pose stays where none of its corners has an image: they were found beyond the fold of a lens.
+    """
     detections = {name: corners[view : view + 1] for name, corners in adjustment.detections.items()}
     alone = replace(
         adjustment,
@@ -286,6 +289,8 @@ def _trimmed(adjustment: Adjustment, view: int) -> Adjustment:
     for _ in range(TRIMMINGS):
         alone = alone.refined(only_poses=True)
         distances = {name: np.linalg.norm(residuals, axis=-1) for name, residuals in alone.residuals.items()}
+        if not any(np.isfinite(distance).any() for distance in distances.values()):
+            return alone
         middle = np.nanmedian(np.concatenate(list(distances.values()), axis=1))
         alone = replace(alone, set_aside={name: distance > middle for name, distance in distances.items()})
     return alone

@@ -17,7 +17,7 @@ import resource
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import astuple, replace
 from functools import partial
 
 import cv2
@@ -29,6 +29,8 @@ from camviz.lenses import BrownConrady, KannalaBrandt
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration import Board, CannotCalibrate, Detections
+from camviz_clinic.calibration.boards.charuco import FEWEST
+from camviz_clinic.calibration.detection import seen
 from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.findings import rig as checks
 from camviz_clinic.checks.registry import Fault, Finding, Kind
@@ -99,24 +101,37 @@ def by_opencv(truth: VirtualRig, found: dict[str, Detections], models: dict[str,
 
 
 def calibrated_by_opencv(
-    found: dict[str, Detections], board: Board, models: dict[str, str]
+    found: dict[str, Detections], board: Board, models: dict[str, str], held: dict[str, Camera] | None = None
 ) -> dict[str, Camera] | None:
-    """The cameras of cv2.calibrateMultiview from the same corners; None where it raises or gives no numbers."""
+    """The cameras of cv2.calibrateMultiview from the same corners; None where it raises or gives no numbers.
+
+    Of a frame it has the corners that all its cameras see, some twice in the place of the others. Corners that were not
+    seen may be given as (-1, -1) by its documentation, but OpenCV 5.0.0 takes them for corners. `held` are cameras
+    whose intrinsics and lens it takes as they are.
+    """
     frames = sorted({place for each in found.values() for place in each.places})
-    corners = board.corners.astype(np.float32)
-    nothing = np.full((1, len(corners), 2), -1, np.float32)  # what is negative was not seen
-    images, mask = [], np.zeros((len(found), len(frames)), np.uint8)
-    for number, each in enumerate(found.values()):
-        at = dict(zip(each.places, np.nan_to_num(each.corners, nan=-1).astype(np.float32)[:, None], strict=True))
-        images.append([at.get(frame, nothing) for frame in frames])
-        mask[number] = [frame in at for frame in frames]
+    views = {name: dict(zip(each.places, each.corners, strict=True)) for name, each in found.items()}
+    points, images, mask = [], [[] for _ in found], np.zeros((len(found), len(frames)), np.uint8)
+    for column, frame in enumerate(frames):
+        views_of_it = [each[frame] for each in views.values() if frame in each]
+        common = np.flatnonzero(seen(np.stack(views_of_it)).all(axis=0))
+        enough = len(common) >= FEWEST and np.linalg.matrix_rank(np.diff(board.corners[common], axis=0)) > 1
+        which = np.resize(common if enough else np.arange(len(board.corners)), len(board.corners))
+        points.append(board.corners[which].astype(np.float32))
+        for row, each in enumerate(views.values()):
+            mask[row, column] = enough and frame in each
+            image = each[frame][which] if mask[row, column] else np.zeros((len(which), 2))
+            images[row].append(image.astype(np.float32)[None])
     sizes = [(each.width, each.height) for each in found.values()]
     kinds = np.array([int(models[name] == "fisheye") for name in found], np.uint8)
     flags = np.where(kinds, cv2.CALIB_RECOMPUTE_EXTRINSIC | cv2.CALIB_FIX_SKEW, 0).astype(np.int32)
     nobody = [None] * len(found)  # it begins by itself
+    known = [held[name] for name in found] if held else []
+    K, D = [each.intrinsics.K for each in known] or nobody, [np.array(astuple(each.lens)) for each in known] or nobody
+    guess = cv2.CALIB_USE_INTRINSIC_GUESS if held else 0
     try:
         _, matrices, lenses, turns, shifts = cv2.calibrateMultiview(
-            [corners] * len(frames), images, sizes, mask, kinds, nobody, nobody, nobody, nobody, flags
+            points, images, sizes, mask, kinds, K, D, nobody, nobody, flags, guess
         )
     except cv2.error:
         return None
