@@ -23,6 +23,7 @@ AGREE = 0.5  # of the narrowest square: further apart, rough and exact corners a
 THOROUGH = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_EXHAUSTIVE
 CONTRAST = 0.5  # of the board's own: fields beyond its edge that differ by more are squares
 NEAR = 0.25  # of a square: how far to either side of a corner the four fields that meet in it are looked at
+BLUR = 0.1  # of the narrowest square: noise of a single pixel says nothing of a field
 CROSSED = 0.95  # of the corners: where fewer are crossings, what was found is not the board
 WINDOW = 11  # pixels to either side of a corner that OpenCV's samples refine it from
 CLEAR = 0.4  # of the narrowest square: wider windows reach the edges that meet in the next corner
@@ -169,9 +170,10 @@ def crossed(gray: NDArray[Any], corners: Array, board: Shape) -> bool:
     meets white, and number them with the others.
     """
     grid = corners.reshape(board.rows, board.columns, 2)
+    quiet = cv2.GaussianBlur(gray, (0, 0), max(0.5, BLUR * float(_spacing(corners, board).min())))
     along, down = (NEAR * np.asarray(np.gradient(grid, axis=axis)) for axis in (1, 0))
-    one = np.sort([_at(gray, grid + along + down), _at(gray, grid - along - down)], axis=0)
-    other = np.sort([_at(gray, grid + along - down), _at(gray, grid - along + down)], axis=0)
+    one = np.sort([_at(quiet, grid + along + down), _at(quiet, grid - along - down)], axis=0)
+    other = np.sort([_at(quiet, grid + along - down), _at(quiet, grid - along + down)], axis=0)
     turns = np.where(np.add.outer(np.arange(board.rows), np.arange(board.columns)) % 2, -1, 1)
     brighter = turns * ((one[0] > other[1]).astype(int) - (other[0] > one[1]))
     return bool(max(np.mean(brighter == 1), np.mean(brighter == -1)) >= CROSSED)
