@@ -17,7 +17,6 @@ from camviz_clinic.calibration.types import Board
 from camviz_clinic.checks.registry import SEVERITIES, Finding
 from camviz_clinic.checks.rig import lone_poses
 from camviz_clinic.handeye import mends
-from camviz_clinic.handeye.adjusting import far_off
 from camviz_clinic.handeye.delay import Delay, delay
 from camviz_clinic.handeye.mends import FEWEST_TRIED, UNITS, Indices, Tried, exchanged
 from camviz_clinic.handeye.pose_table import RobotPoses
@@ -172,13 +171,14 @@ class PosedPictures:
 
     def _stray(self) -> Iterator[Finding]:
         adjusted = self.readings[0].adjusted
-        stray = np.array(far_off(adjusted.displacements), dtype=np.intp)
+        stray = np.flatnonzero(self.result.stray[self.seen])
         if not len(stray):
             return
-        order = exchanged(adjusted, np.sort(stray))
+        order = exchanged(adjusted, stray)
         if order is not None:
-            yield self._exchanged(self.seen[np.sort(stray)], self.seen[order])
+            yield self._exchanged(self.seen[stray], self.seen[order])
             return
+        stray = stray[np.argsort(-adjusted.displacements[stray])]
         kept_out = not self.result.used[self.seen[stray]].any()
         shift, turn = adjusted.errors
         said = [

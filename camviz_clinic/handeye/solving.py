@@ -18,6 +18,7 @@ from camviz_clinic.calibration.problem import LEAST_CORNERS
 from camviz_clinic.calibration.types import Board
 from camviz_clinic.checks.rig import lone_poses
 from camviz_clinic.handeye.adjusting import UNKNOWNS, Adjusted, Noise, Pixels, far_off, robust
+from camviz_clinic.handeye.straying import surely
 from camviz_clinic.handeye.weighing import weighed, weighed_in_pixels
 
 MOST_STRAY = 0.2  # of the poses
@@ -39,6 +40,7 @@ class HandEye:
         adjusted: The solution over the poses that were used.
         used: (poses,) of bool, true for a pose that does not contradict the others.
         displacements: (poses,), metres by which each pose's board is off, turns counted at the board's distance.
+        stray: (poses,) of bool, true for a pose that contradicts the others. Where they are many, all poses are used.
         scale: By what the camera's lengths were multiplied to be those of the robot: 1 unless it was asked for.
 
     >>> from camviz_clinic.handeye.virtual import cell
@@ -52,6 +54,7 @@ class HandEye:
     adjusted: Adjusted
     used: Mask
     displacements: Array
+    stray: Mask
     scale: float = 1.0
 
     @property
@@ -176,8 +179,9 @@ def hand_eye(
     """X and Z of A X B = Z, from poses of a robot and poses of a board.
 
     A start in closed form (Park & Martin) from the triple of poses that most others agree with is refined over all
-    poses at once. A pose that is off by five times the median or more is set aside. How much a turn, a shift across the
-    picture, the board's distance and the robot's own poses count is learnt from what they leave.
+    poses at once. A pose is set aside where it is off by five times the median or more, and by more than chance. How
+    much a turn, a shift across the picture, the board's distance and the robot's own poses count is learnt from what
+    they leave.
 
     Args:
         base_from_hand: The robot's poses, in metres.
@@ -264,10 +268,10 @@ def hand_eye_from_corners(
 
 
 def spread_out(result: HandEye, seen: Mask) -> HandEye:
-    """A result of the poses `seen`, with `used` and `displacements` of all poses: False and NaN for the others."""
-    used, displacements = np.zeros(len(seen), bool), np.full(len(seen), np.nan)
-    used[seen], displacements[seen] = result.used, result.displacements
-    return replace(result, used=used, displacements=displacements)
+    """A result of the poses `seen`, with what is told of every pose told of all: False and NaN for the others."""
+    used, stray, displacements = np.zeros(len(seen), bool), np.zeros(len(seen), bool), np.full(len(seen), np.nan)
+    used[seen], stray[seen], displacements[seen] = result.used, result.stray, result.displacements
+    return replace(result, used=used, stray=stray, displacements=displacements)
 
 
 def _started(motions: Motions) -> Adjusted:
@@ -277,21 +281,33 @@ def _started(motions: Motions) -> Adjusted:
 
 def _result(first: Adjusted, eye_to_hand: bool, pixels: Pixels | None) -> HandEye:
     """The solution over the poses that do not contradict the others."""
-    stray = np.isin(np.arange(len(first.motions)), far_off(first.displacements))
-    few = stray.mean() <= MOST_STRAY and (~stray).sum() >= FEWEST
-    used: Mask = np.asarray(~stray if few else np.ones(len(stray), bool))
+    stray: Mask = np.asarray(np.isin(np.arange(len(first.motions)), far_off(first.displacements)))
+    stray &= (~stray).sum() >= FEWEST
+    best = _over(first, ~stray, eye_to_hand, pixels)
+    while stray.any():
+        sure = surely(best, first.motions, pixels, stray)
+        if (sure == stray).all():
+            break
+        stray = sure
+        best = _over(first, ~stray, eye_to_hand, pixels)
+    used: Mask = np.asarray(~stray | (stray.mean() > MOST_STRAY))
+    if stray.any() and used.all():
+        best = _over(first, used, eye_to_hand, pixels)
+    everywhere = replace(best, motions=first.motions, measured=first.measured, noise=None)
+    return HandEye(eye_to_hand, best, used, everywhere.displacements, stray)
+
+
+def _over(first: Adjusted, used: Mask, eye_to_hand: bool, pixels: Pixels | None) -> Adjusted:
+    """The solution over some poses, with the sizes of errors that they show."""
     best = replace(first, motions=first.motions.only(used), measured=first.measured.only(used), weights=None)
     best = best.refined()
     side = slice(6, 12) if eye_to_hand else slice(0, 6)
     if pixels is None:
-        best = weighed(best, side)
-    else:
-        best = replace(best, measured=pixels.only(used))
-        if not np.isfinite(best.cost):
-            raise PoseError("by the robot's poses some corners would lie where the camera has no image")
-        best = weighed_in_pixels(best, corner_noise(pixels.only(used), best.motions.cam_from_board), side)
-    everywhere = replace(best, motions=first.motions, measured=first.measured, noise=None)
-    return HandEye(eye_to_hand, best, used, everywhere.displacements)
+        return weighed(best, side)
+    best = replace(best, measured=pixels.only(used))
+    if not np.isfinite(best.cost):
+        raise PoseError("by the robot's poses some corners would lie where the camera has no image")
+    return weighed_in_pixels(best, corner_noise(pixels.only(used), best.motions.cam_from_board), side)
 
 
 def corner_noise(pixels: Pixels, cam_from_board: RigidTransform) -> float:
