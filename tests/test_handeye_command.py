@@ -75,6 +75,32 @@ def test_json_is_strict_and_says_the_same(words, room, capsys):
     assert said["usable"] is True
 
 
+def test_of_squares_that_are_told_too_long_the_scale_is_told_kept_and_no_fault(words, room, capsys):
+    """Squares of 25 mm that are told as 30: by the robot they are 25, within three ±; and told as 25 the scale is 1."""
+    given = [*words(), "--unknown-scale"]
+    assert main(given) == 0
+    metric = yaml.safe_load((room / "handeye.yaml").read_text(encoding="utf-8"))
+    assert metric["scale"]["factor"] == pytest.approx(1, abs=3 * metric["scale"]["sigma"])
+    assert metric["scale"]["sigma"] < 0.002
+    capsys.readouterr()
+    given[given.index("25")] = "30"
+    assert main(given) == 0
+    said = capsys.readouterr().out
+    kept = yaml.safe_load((room / "handeye.yaml").read_text(encoding="utf-8"))
+    scale = kept["scale"]
+    assert scale["factor"] == pytest.approx(25 / 30, abs=3 * scale["sigma"])
+    assert scale["square_mm"] == pytest.approx(25, abs=3 * scale["square_sigma_mm"])
+    assert f"scale: {scale['factor']:.4f} ± {scale['sigma']:.4f}. In the robot's unit" in said
+    assert "Not checked, the scale was solved for: wrong-unit, scale-differs." in said
+    assert np.array(kept["hand_from_cam"]["matrix"]) == pytest.approx(
+        np.array(metric["hand_from_cam"]["matrix"]), abs=1e-4
+    )
+    assert main([*given, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["scale"] == scale
+    assert main(words()) == 0
+    assert "scale" not in yaml.safe_load((room / "handeye.yaml").read_text(encoding="utf-8"))
+
+
 def test_poses_that_must_be_mended_are_a_fault_and_nothing_is_written(words, room, shot, capsys):
     assert main(words(shot.true.base_from_hand.inv())) == 1
     said = capsys.readouterr().out

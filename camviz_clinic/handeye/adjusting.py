@@ -88,6 +88,10 @@ class Pixels:
         """Of some poses."""
         return replace(self, pixels=self.pixels[kept])
 
+    def resized(self, factor: float) -> Pixels:
+        """Of a board that is so many times as large."""
+        return replace(self, points=factor * self.points)
+
 
 @dataclass(frozen=True)
 class Noise:

@@ -54,6 +54,7 @@ class PosedPictures:
         board: What the pictures show.
         eye_to_hand: The camera stands still and the board is on the hand.
         pictures: A name for each row.
+        any_scale: The lengths of the board are not known: by what they must be multiplied is solved for.
 
     Raises: PoseError where there are not as many rows as pictures, and for fewer than three with four corners or more.
 
@@ -71,6 +72,7 @@ class PosedPictures:
     board: Board
     eye_to_hand: bool = False
     pictures: tuple[str, ...] = ()
+    any_scale: bool = False
 
     def __post_init__(self) -> None:
         if len(self.pixels) != len(self.poses.base_from_hand):
@@ -97,15 +99,16 @@ class PosedPictures:
     def readings(self) -> tuple[Tried, Tried]:
         """The poses as given, and the reading under which robot and pictures agree best."""
         rows, others = self.poses.base_from_hand, self.poses.others
-        return mends.likely(rows, self.seen, self.cam_from_board, others, self.eye_to_hand)
+        return mends.likely(rows, self.seen, self.cam_from_board, others, self.eye_to_hand, self.any_scale)
 
     @cached_property
     def delay(self) -> Delay | None:
         """The delay of the pictures against the poses; None where the table has no times that rise."""
         if self.poses.times is None:
             return None
-        times, rows = self.poses.times, self.poses.base_from_hand
-        return delay(times, rows, self.seen, self.cam_from_board, self.eye_to_hand)
+        told, factor = self.poses.base_from_hand, self.readings[0].factor
+        rows = RigidTransform.from_components(factor * told.translation, told.rotation)
+        return delay(self.poses.times, rows, self.seen, self.cam_from_board, self.eye_to_hand)
 
     @cached_property
     def result(self) -> HandEye:
@@ -114,7 +117,12 @@ class PosedPictures:
         Raises: PoseError where the poses put corners to where the camera has no image.
         """
         return hand_eye_from_corners(
-            self.poses.base_from_hand, self.pixels, self.camera, self.board, eye_to_hand=self.eye_to_hand
+            self.poses.base_from_hand,
+            self.pixels,
+            self.camera,
+            self.board,
+            eye_to_hand=self.eye_to_hand,
+            any_scale=self.any_scale,
         )
 
     @cached_property
@@ -134,13 +142,16 @@ class PosedPictures:
         """What was not looked for, and why."""
         few = f"it takes {FEWEST_TRIED} poses or more"
         said = [(id, few) for id in MENDS] if len(self.seen) < FEWEST_TRIED else []
+        if self.any_scale:
+            said = [each for each in said if each[0] != "wrong-unit"]
+            said += [(id, "the scale was solved for") for id in ("wrong-unit", "scale-differs")]
         if self.poses.times is None:
             said.append(("time-offset", "the poses have no column `time`"))
         elif self.delay is None:
             said.append(("time-offset", "the times do not rise from row to row, or are too few"))
         if self._mended_at_all:
             ids = ("one-axis", "little-turning", "stray-pose", "scale-differs", "robot-disagrees")
-            said += [(id, "the poses must be mended first") for id in ids]
+            said += [(id, "the poses must be mended first") for id in ids if id not in dict(said)]
         return tuple(said)
 
     @property
@@ -181,12 +192,13 @@ class PosedPictures:
         stray = stray[np.argsort(-adjusted.displacements[stray])]
         kept_out = not self.result.used[self.seen[stray]].any()
         shift, turn = adjusted.errors
+        metre = self.result.scale  # of the robot, by which the board's lengths are told
         said = [
-            f"{self.named(int(self.seen[i]))} is off by {1000 * shift[i]:.2g} mm and {np.degrees(turn[i]):.2g}°"
+            f"{self.named(int(self.seen[i]))} is off by {1000 * metre * shift[i]:.2g} mm and {np.degrees(turn[i]):.2g}°"
             for i in stray
         ]
-        worst = float(1000 * adjusted.displacements[stray[0]])
-        median = 1000 * float(np.median(adjusted.displacements))
+        worst = float(1000 * metre * adjusted.displacements[stray[0]])
+        median = 1000 * metre * float(np.median(adjusted.displacements))
         more = f" and {len(said) - 3} more" * (len(said) > 3)
         yield Finding(
             "stray-pose",
@@ -217,6 +229,8 @@ class PosedPictures:
         )
 
     def _scale(self) -> Iterator[Finding]:
+        if self.any_scale:
+            return
         scale, sigma = self.result.adjusted.scale
         if is_off(scale, sigma):
             side = 1000 * self.board.square_size
@@ -236,12 +250,13 @@ class PosedPictures:
         given = self.readings[0]
         lever = given.adjusted.motions.lever
         if given.error >= DISAGREE * lever:
+            metre = self.result.scale
             yield Finding(
                 "robot-disagrees",
                 "warning",
-                f"Robot and pictures disagree by {1000 * given.error:.2g} mm (median) at a board {lever:.2g} m away, "
+                f"Robot and pictures disagree by {1000 * metre * given.error:.2g} mm (median) at a board {metre * lever:.2g} m away, "
                 "and no other order, unit or form of the poses mends it.",
-                1000 * given.error,
+                1000 * metre * given.error,
                 "mm",
                 causes=CAUSES["robot-disagrees"],
                 remedy="See that board and camera are fixed and that the poses are those of the frame you mean.",

@@ -161,6 +161,18 @@ class HandEye:
         """How many σ an interval of 95 % reaches to either side: Student's, with as many poses less three."""
         return float(student.ppf(0.975, max(len(self.motions) - FEWEST, 1)))
 
+    @property
+    def scale_sigma(self) -> float:
+        """One standard deviation of `scale`, clustered by pose: 0 where the scale was not asked for."""
+        if not self.adjusted.also:
+            return 0.0
+        return self.scale * float(np.sqrt(self.adjusted.covariance[UNKNOWNS, UNKNOWNS]))
+
+    @property
+    def scale_known(self) -> bool:
+        """Whether the motions tell the scale: it is away from 0 by as much as a 95 % interval reaches."""
+        return bool(self.scale > self.times_sigma * self.scale_sigma)
+
     def _sigma(self, pose: RigidTransform, part: slice) -> tuple[Array, Array]:
         """Of a pose's rotation and translation: δt = ω × t + τ."""
         covariance = self.covariance[part, part]
@@ -203,29 +215,35 @@ def hand_eye(
     np.True_
     """
     motions = Motions.of(base_from_hand, cam_from_board, eye_to_hand)
-    if any_scale:
-        return _resized(motions, eye_to_hand)
-    return _result(_started(motions), eye_to_hand, None)
+    return _resized(motions, eye_to_hand, None) if any_scale else _result(_started(motions), eye_to_hand, None)
 
 
-def _resized(motions: Motions, eye_to_hand: bool) -> HandEye:
-    """The solution with the camera's lengths multiplied by the factor of least squares."""
+def _resized(motions: Motions, eye_to_hand: bool, pixels: Pixels | None) -> HandEye:
+    """The solution with the camera's lengths, and the board, multiplied by the factor of least squares."""
+
+    def solved(first: Adjusted) -> HandEye:
+        return _result(first, eye_to_hand, pixels.resized(factor) if pixels else None)
+
     factor = 1 / start(motions, None)[2]
-    found = _result(_started(motions.resized(factor)), eye_to_hand, None)
+    found = solved(_started(motions.resized(factor)))
     for _ in range(MOST_RESIZED):
         shorter, sigma = found.adjusted.scale
         if not abs(shorter - 1) > SETTLED * sigma:
             break
         factor /= max(shorter, 0.1)
-        found = _result(
-            robust(motions.resized(factor), found.mount_from_cam, found.other_from_board), eye_to_hand, None
-        )
+        found = solved(robust(motions.resized(factor), found.mount_from_cam, found.other_from_board))
     adjusted = replace(found.adjusted, also=(found.adjusted.robot_lengths,))
     return replace(found, adjusted=adjusted, scale=factor)
 
 
 def hand_eye_from_corners(
-    base_from_hand: RigidTransform, pixels: ArrayLike, camera: Camera, board: Board, *, eye_to_hand: bool = False
+    base_from_hand: RigidTransform,
+    pixels: ArrayLike,
+    camera: Camera,
+    board: Board,
+    *,
+    eye_to_hand: bool = False,
+    any_scale: bool = False,
 ) -> HandEye:
     """`hand_eye` with the board's corners in place of its poses, refined through their reprojection errors.
 
@@ -240,6 +258,7 @@ def hand_eye_from_corners(
         camera: The calibrated camera.
         board: What the pictures show.
         eye_to_hand: The camera stands still and the board is on the hand.
+        any_scale: The board's lengths are not known. By what they must be multiplied is solved for with X and Z.
 
     Returns: X, Z, and the covariance clustered by pose.
 
@@ -264,7 +283,10 @@ def hand_eye_from_corners(
     alone = Camera(camera.intrinsics, camera.lens)
     cam_from_board = lone_poses(alone, board, corners[seen])
     motions = Motions.of(base_from_hand[seen], cam_from_board, eye_to_hand)
-    return spread_out(_result(_started(motions), eye_to_hand, Pixels(alone, board.corners, corners[seen])), seen)
+    measured = Pixels(alone, board.corners, corners[seen])
+    if any_scale:
+        return spread_out(_resized(motions, eye_to_hand, measured), seen)
+    return spread_out(_result(_started(motions), eye_to_hand, measured), seen)
 
 
 def spread_out(result: HandEye, seen: Mask) -> HandEye:
