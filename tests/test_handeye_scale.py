@@ -1,4 +1,4 @@
-"""A board whose lengths are not known: the robot's motions tell by what they must be multiplied, and when they do not."""
+"""A board whose lengths are not known: the robot's motions tell by what to multiply them, and when they do not."""
 
 from dataclasses import replace
 
@@ -100,6 +100,15 @@ def test_a_stray_pose_is_off_by_millimetres_of_the_robot():
     (finding,) = case(true.told(RigidTransform.concatenate(poses)), 10).findings
     assert finding.id == "stray-pose"
     assert float(finding.sentence.split("is off by ")[1].split(" mm")[0]) == pytest.approx(30, abs=2)
+
+
+def test_a_robot_disagrees_by_millimetres_of_its_own():
+    true = cell(np.random.default_rng(13), 15, robot_mm=15, robot_deg=1.5)
+    metric, larger = (
+        next(each for each in case(true, times).findings if each.id == "robot-disagrees") for times in (1, 10)
+    )
+    assert larger.value == pytest.approx(metric.value, rel=0.02)
+    assert larger.sentence == metric.sentence
 
 
 def test_a_hand_that_turns_about_one_point_does_not_tell_the_scale():

@@ -251,12 +251,13 @@ class PosedPictures:
         lever = given.adjusted.motions.lever
         if given.error >= DISAGREE * lever:
             metre = self.result.scale
+            error, away = 1000 * metre * given.error, metre * lever
             yield Finding(
                 "robot-disagrees",
                 "warning",
-                f"Robot and pictures disagree by {1000 * metre * given.error:.2g} mm (median) at a board {metre * lever:.2g} m away, "
-                "and no other order, unit or form of the poses mends it.",
-                1000 * metre * given.error,
+                f"Robot and pictures disagree by {error:.2g} mm (median) at a board {away:.2g} m away, and "
+                "no other order, unit or form of the poses mends it.",
+                error,
                 "mm",
                 causes=CAUSES["robot-disagrees"],
                 remedy="See that board and camera are fixed and that the poses are those of the frame you mean.",
