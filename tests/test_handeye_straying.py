@@ -41,15 +41,14 @@ def test_with_one_size_for_all_errors_it_is_fishers_f_with_the_numbers_less_the_
     spread = rng.normal(0, 1, (21, 6, 6))
     covariance = spread @ spread.swapaxes(1, 2)
     jacobian = rng.normal(0, 1, (21, 6, 12))
-    stray = np.arange(21) == 20
-    twists = np.zeros((21, 6))
-    twists[20] = rng.normal(0, 6, 6)
-    (chance,) = Offsets(twists, jacobian, covariance[None]).chances(stray)
     W = np.linalg.inv(covariance[:20])
     known = np.linalg.inv(np.einsum("pia,pij,pjb->ab", jacobian[:20], W, jacobian[:20]))
     foretold = covariance[20] + jacobian[20] @ known @ jacobian[20].T
-    square = twists[20] @ np.linalg.solve(foretold, twists[20])
-    assert chance == pytest.approx(fisher.sf(square / 6, 6, 20 * 6 - 12 + 0.5))
+    off = rng.normal(0, 1, 6)
+    twists = np.zeros((21, 6))
+    twists[20] = np.linalg.cholesky(foretold) @ (np.sqrt(30) * off / np.linalg.norm(off))
+    (chance,) = Offsets(twists, jacobian, covariance[None]).chances(np.arange(21) == 20)
+    assert chance == pytest.approx(fisher.sf(30 / 6, 6, 20 * 6 - 12 + 0.5), rel=1e-5, abs=0)
 
 
 def test_the_information_on_several_sizes_is_that_of_the_whole_covariance():
