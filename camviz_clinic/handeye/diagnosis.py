@@ -229,8 +229,6 @@ class PosedPictures:
         )
 
     def _scale(self) -> Iterator[Finding]:
-        if self.any_scale:
-            return
         scale, sigma = self.result.adjusted.scale
         if is_off(scale, sigma):
             side = 1000 * self.board.square_size
