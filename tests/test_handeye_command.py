@@ -56,6 +56,7 @@ def test_x_is_printed_and_kept_with_a_sigma_that_reaches_the_truth(words, shot, 
     kept = yaml.safe_load((room / "handeye.yaml").read_text(encoding="utf-8"))
     X, truth = np.array(kept["hand_from_cam"]["matrix"]), shot.true.X.as_matrix()
     assert kept["arrangement"] == "eye in hand"
+    assert "scale" not in kept
     off = np.abs(X[:3, 3] - truth[:3, 3])
     assert (off < 4 * np.array(kept["sigma_m"])).all()
     assert (np.array(kept["sigma_m"]) < 0.001).all()
@@ -74,6 +75,30 @@ def test_json_is_strict_and_says_the_same(words, room, capsys):
     assert {key: said[key] for key in kept} == kept
     assert said["findings"] == []
     assert said["usable"] is True
+
+
+def test_of_squares_that_are_told_too_long_the_scale_is_told_kept_and_no_fault(words, room, capsys):
+    """Squares of 25 mm that are told as 30: by the robot they are 25, within three ±; and told as 25 the scale is 1."""
+    given = [*words(), "--unknown-scale"]
+    assert main(given) == 0
+    metric = yaml.safe_load((room / "handeye.yaml").read_text(encoding="utf-8"))
+    assert metric["scale"]["factor"] == pytest.approx(1, abs=3 * metric["scale"]["sigma"])
+    assert metric["scale"]["sigma"] < 0.002
+    capsys.readouterr()
+    given[given.index("25")] = "30"
+    assert main(given) == 0
+    said = capsys.readouterr().out
+    kept = yaml.safe_load((room / "handeye.yaml").read_text(encoding="utf-8"))
+    scale = kept["scale"]
+    assert scale["factor"] == pytest.approx(25 / 30, abs=3 * scale["sigma"])
+    assert scale["square_mm"] == pytest.approx(25, abs=3 * scale["square_sigma_mm"])
+    assert f"scale: {scale['factor']:.4f} ± {scale['sigma']:.4f}. In the robot's unit" in said
+    assert "Not checked, the scale was solved for: wrong-unit, scale-differs." in said
+    assert np.array(kept["hand_from_cam"]["matrix"]) == pytest.approx(
+        np.array(metric["hand_from_cam"]["matrix"]), abs=1e-4
+    )
+    assert main([*given, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["scale"] == scale
 
 
 @pytest.mark.thorough

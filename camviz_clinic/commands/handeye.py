@@ -57,6 +57,7 @@ EPILOG = """\
 examples:
   camviz handeye camera.yaml poses.csv shots/*.png
   camviz handeye camera.yaml poses.csv shots/ --board 9x6 --square-mm 25 --eye-to-hand -o handeye.yaml
+  camviz handeye camera.yaml poses.csv shots/ --board 9x6 --square-mm 25 --unknown-scale
   camviz handeye camera.yaml poses.txt shots/ --rotation euler-ZYX --angles deg --unit mm --json
 
 exit status:
@@ -79,6 +80,11 @@ def add(commands: Any) -> None:
     command.add_argument("--rotation", metavar="FORM", type=_form, help="matrix, xyzw, wxyz, rotvec or euler-ORDER")
     command.add_argument("--angles", choices=("deg", "rad"), help="of Euler angles and rotation vectors")
     command.add_argument("--unit", choices=("mm", "m"), help="of the places (default: by the header, or the numbers)")
+    command.add_argument(
+        "--unknown-scale",
+        action="store_true",
+        help="the board's lengths are not known for sure: the scale is solved for by the robot's motions",
+    )
     command.add_argument("--invert", action="store_true", help="the poses are hand_from_base")
     command.add_argument("--camera", metavar="NAME", help="the camera that took IMAGES, where CAMERA has several")
     add_board(command, required=False, default=False)
@@ -154,7 +160,7 @@ def _case(calibration: Calibration, options: argparse.Namespace) -> tuple[PosedP
     names = {row: path.name for path, row in zip(paths, rows, strict=True) if row is not None}
     pixels = _pixels(found, board, rows, len(poses.base_from_hand))
     labels = tuple(names.get(row, "no picture") for row in range(len(poses.base_from_hand)))
-    case = PosedPictures(poses, pixels, camera, board, options.eye_to_hand, labels)
+    case = PosedPictures(poses, pixels, camera, board, options.eye_to_hand, labels, options.unknown_scale)
     return case, (*found.skipped, *skipped)
 
 

@@ -21,7 +21,7 @@ from camviz_clinic.calibration.motions import Mask, Motions
 MOST_STEPS = 60
 SETTLED = 1e-12  # of the sum of squares, what a step must still promise to take off
 UNKNOWNS = 12
-STRAY = 5.0  # times the median displacement: of six Gaussian errors of one size a pose reaches 2.5 once in 100,000
+STRAY = 5.0  # times the median displacement: nearer, a pose does little harm; whether it is chance, straying.py says
 
 
 class BoardMeasurements(Protocol):
@@ -87,6 +87,10 @@ class Pixels:
     def only(self, kept: Mask) -> Pixels:
         """Of some poses."""
         return replace(self, pixels=self.pixels[kept])
+
+    def resized(self, factor: float) -> Pixels:
+        """Of a board that is so many times as large."""
+        return replace(self, points=factor * self.points)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,6 @@ from camviz_clinic.calibration.types import Board
 from camviz_clinic.checks.registry import SEVERITIES, Finding
 from camviz_clinic.checks.rig import lone_poses
 from camviz_clinic.handeye import mends
-from camviz_clinic.handeye.adjusting import far_off
 from camviz_clinic.handeye.delay import Delay, delay
 from camviz_clinic.handeye.mends import FEWEST_TRIED, UNITS, Indices, Tried, exchanged
 from camviz_clinic.handeye.pose_table import RobotPoses
@@ -55,6 +54,7 @@ class PosedPictures:
         board: What the pictures show.
         eye_to_hand: The camera stands still and the board is on the hand.
         pictures: A name for each row.
+        any_scale: The lengths of the board are not known: by what they must be multiplied is solved for.
 
     Raises: PoseError where there are not as many rows as pictures, and for fewer than three with four corners or more.
 
@@ -72,6 +72,7 @@ class PosedPictures:
     board: Board
     eye_to_hand: bool = False
     pictures: tuple[str, ...] = ()
+    any_scale: bool = False
 
     def __post_init__(self) -> None:
         if len(self.pixels) != len(self.poses.base_from_hand):
@@ -98,15 +99,16 @@ class PosedPictures:
     def readings(self) -> tuple[Tried, Tried]:
         """The poses as given, and the reading under which robot and pictures agree best."""
         rows, others = self.poses.base_from_hand, self.poses.others
-        return mends.likely(rows, self.seen, self.cam_from_board, others, self.eye_to_hand)
+        return mends.likely(rows, self.seen, self.cam_from_board, others, self.eye_to_hand, self.any_scale)
 
     @cached_property
     def delay(self) -> Delay | None:
         """The delay of the pictures against the poses; None where the table has no times that rise."""
         if self.poses.times is None:
             return None
-        times, rows = self.poses.times, self.poses.base_from_hand
-        return delay(times, rows, self.seen, self.cam_from_board, self.eye_to_hand)
+        told, factor = self.poses.base_from_hand, self.readings[0].factor
+        rows = RigidTransform.from_components(factor * told.translation, told.rotation)
+        return delay(self.poses.times, rows, self.seen, self.cam_from_board, self.eye_to_hand)
 
     @cached_property
     def result(self) -> HandEye:
@@ -115,7 +117,12 @@ class PosedPictures:
         Raises: PoseError where the poses put corners to where the camera has no image.
         """
         return hand_eye_from_corners(
-            self.poses.base_from_hand, self.pixels, self.camera, self.board, eye_to_hand=self.eye_to_hand
+            self.poses.base_from_hand,
+            self.pixels,
+            self.camera,
+            self.board,
+            eye_to_hand=self.eye_to_hand,
+            any_scale=self.any_scale,
         )
 
     @cached_property
@@ -135,13 +142,16 @@ class PosedPictures:
         """What was not looked for, and why."""
         few = f"it takes {FEWEST_TRIED} poses or more"
         said = [(id, few) for id in MENDS] if len(self.seen) < FEWEST_TRIED else []
+        if self.any_scale:
+            said = [each for each in said if each[0] != "wrong-unit"]
+            said += [(id, "the scale was solved for") for id in ("wrong-unit", "scale-differs")]
         if self.poses.times is None:
             said.append(("time-offset", "the poses have no column `time`"))
         elif self.delay is None:
             said.append(("time-offset", "the times do not rise from row to row, or are too few"))
         if self._mended_at_all:
             ids = ("one-axis", "little-turning", "stray-pose", "scale-differs", "robot-disagrees")
-            said += [(id, "the poses must be mended first") for id in ids]
+            said += [(id, "the poses must be mended first") for id in ids if id not in dict(said)]
         return tuple(said)
 
     @property
@@ -172,21 +182,23 @@ class PosedPictures:
 
     def _stray(self) -> Iterator[Finding]:
         adjusted = self.readings[0].adjusted
-        stray = np.array(far_off(adjusted.displacements), dtype=np.intp)
+        stray = np.flatnonzero(self.result.stray[self.seen])
         if not len(stray):
             return
-        order = exchanged(adjusted, np.sort(stray))
+        order = exchanged(adjusted, stray)
         if order is not None:
-            yield self._exchanged(self.seen[np.sort(stray)], self.seen[order])
+            yield self._exchanged(self.seen[stray], self.seen[order])
             return
+        stray = stray[np.argsort(-adjusted.displacements[stray])]
         kept_out = not self.result.used[self.seen[stray]].any()
         shift, turn = adjusted.errors
+        metre = self.result.scale  # of the robot, by which the board's lengths are told
         said = [
-            f"{self.named(int(self.seen[i]))} is off by {1000 * shift[i]:.2g} mm and {np.degrees(turn[i]):.2g}°"
+            f"{self.named(int(self.seen[i]))} is off by {1000 * metre * shift[i]:.2g} mm and {np.degrees(turn[i]):.2g}°"
             for i in stray
         ]
-        worst = float(1000 * adjusted.displacements[stray[0]])
-        median = 1000 * float(np.median(adjusted.displacements))
+        worst = float(1000 * metre * adjusted.displacements[stray[0]])
+        median = 1000 * metre * float(np.median(adjusted.displacements))
         more = f" and {len(said) - 3} more" * (len(said) > 3)
         yield Finding(
             "stray-pose",
@@ -236,12 +248,14 @@ class PosedPictures:
         given = self.readings[0]
         lever = given.adjusted.motions.lever
         if given.error >= DISAGREE * lever:
+            metre = self.result.scale
+            error, away = 1000 * metre * given.error, metre * lever
             yield Finding(
                 "robot-disagrees",
                 "warning",
-                f"Robot and pictures disagree by {1000 * given.error:.2g} mm (median) at a board {lever:.2g} m away, "
-                "and no other order, unit or form of the poses mends it.",
-                1000 * given.error,
+                f"Robot and pictures disagree by {error:.2g} mm (median) at a board {away:.2g} m away, and "
+                "no other order, unit or form of the poses mends it.",
+                error,
                 "mm",
                 causes=CAUSES["robot-disagrees"],
                 remedy="See that board and camera are fixed and that the poses are those of the frame you mean.",

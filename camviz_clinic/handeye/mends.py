@@ -19,6 +19,7 @@ MUCH_BETTER = 3.0  # times: what another reading must take off the poses' errors
 ALIKE = 1.1  # times the least error: of readings so near to it the one that fits most poses is named
 FEWEST_TRIED = 6  # poses: fewer can be fitted by a wrong reading
 NEARER = 2.0  # times: by what the angles must agree better for an order or a form to be tried
+RESCALED = 3  # rounds
 SHIFTS = (1, -1, 2, -2, 3, -3)
 NEAR_UNIT = 1.1  # times
 UNITS = {
@@ -52,11 +53,19 @@ class Pairing:
 
 @dataclass(frozen=True, eq=False)
 class Tried:
-    """A pairing that was solved; `unit` is the factor of the robot's lengths where they are in another unit, or 1."""
+    """A pairing that was solved.
+
+    Attributes:
+        pairing: Which poses belong to which boards.
+        unit: The factor of the robot's lengths where they are in another unit, or 1.
+        adjusted: X and Z, in the lengths of the camera's board.
+        factor: By what the robot's lengths were multiplied: the unit, or what fits best where the scale is not known.
+    """
 
     pairing: Pairing
     unit: float
     adjusted: Adjusted
+    factor: float
 
     @property
     def error(self) -> float:
@@ -80,11 +89,27 @@ def tried(pairing: Pairing, eye_to_hand: bool, unit: float | None = None) -> Tri
     factor = start(motions, None)[2] if unit is None else unit
     unit = next((each for each in (*UNITS, 1.0) if max(each / factor, factor / each) < NEAR_UNIT), 1.0)
     X, Z, _ = start(motions.scaled(unit))
-    return Tried(pairing, unit, robust(motions.scaled(unit), *map(RigidTransform.from_matrix, (X, Z))))
+    return Tried(pairing, unit, robust(motions.scaled(unit), *map(RigidTransform.from_matrix, (X, Z))), unit)
+
+
+def tried_at_any_scale(pairing: Pairing, eye_to_hand: bool) -> Tried:
+    """A pairing solved with the robot's lengths multiplied by the factor that fits best."""
+    motions = Motions.of(pairing.base_from_hand, pairing.cam_from_board, eye_to_hand)
+    X, Z, factor = start(motions, None)
+    here = robust(motions.scaled(factor), *map(RigidTransform.from_matrix, (X, Z)))
+    for _ in range(RESCALED):
+        factor *= float(np.clip(here.scale[0], 0.5, 2))
+        here = robust(motions.scaled(factor), here.X, here.Z)
+    return Tried(pairing, 1.0, here, factor)
 
 
 def likely(
-    rows: RigidTransform, seen: Indices, cam_from_board: RigidTransform, others: Readings, to_hand: bool
+    rows: RigidTransform,
+    seen: Indices,
+    cam_from_board: RigidTransform,
+    others: Readings,
+    to_hand: bool,
+    any_scale: bool = False,
 ) -> tuple[Tried, Tried]:
     """The poses as they were given, and the reading under which robot and pictures agree best.
 
@@ -94,16 +119,18 @@ def likely(
         cam_from_board: The board in these pictures.
         others: The same rows in other forms, by what asks for them.
         to_hand: The camera stands still.
+        any_scale: The board's lengths are not known, so that no unit is tried.
 
     Returns:
         given: The poses as they were given, in the given unit.
         best: Under another reading if it takes off two thirds of the error or more, otherwise the same.
     """
     plain = Pairing("", "", "", rows[seen], cam_from_board)
-    given = tried(plain, to_hand, 1.0)
+    given = tried_at_any_scale(plain, to_hand) if any_scale else tried(plain, to_hand, 1.0)
     if len(seen) < FEWEST_TRIED:
         return given, given
-    readings = [tried(each, to_hand) for each in (plain, *_pairings(rows, seen, cam_from_board, others, to_hand))]
+    solved = tried_at_any_scale if any_scale else tried
+    readings = [solved(each, to_hand) for each in (plain, *_pairings(rows, seen, cam_from_board, others, to_hand))]
     least = min(each.error for each in readings)
     alike = [each for each in readings if each.error <= ALIKE * least]
     best = min(alike, key=lambda each: each.strays)  # the first of equals, which is the simplest

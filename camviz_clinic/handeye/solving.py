@@ -18,6 +18,7 @@ from camviz_clinic.calibration.problem import LEAST_CORNERS
 from camviz_clinic.calibration.types import Board
 from camviz_clinic.checks.rig import lone_poses
 from camviz_clinic.handeye.adjusting import UNKNOWNS, Adjusted, Noise, Pixels, far_off, robust
+from camviz_clinic.handeye.straying import surely
 from camviz_clinic.handeye.weighing import weighed, weighed_in_pixels
 
 MOST_STRAY = 0.2  # of the poses
@@ -39,6 +40,7 @@ class HandEye:
         adjusted: The solution over the poses that were used.
         used: (poses,) of bool, true for a pose that does not contradict the others.
         displacements: (poses,), metres by which each pose's board is off, turns counted at the board's distance.
+        stray: (poses,) of bool, true for a pose that contradicts the others. Where they are many, all poses are used.
         scale: By what the camera's lengths were multiplied to be those of the robot: 1 unless it was asked for.
 
     >>> from camviz_clinic.handeye.virtual import cell
@@ -52,6 +54,7 @@ class HandEye:
     adjusted: Adjusted
     used: Mask
     displacements: Array
+    stray: Mask
     scale: float = 1.0
 
     @property
@@ -158,6 +161,18 @@ class HandEye:
         """How many σ an interval of 95 % reaches to either side: Student's, with as many poses less three."""
         return float(student.ppf(0.975, max(len(self.motions) - FEWEST, 1)))
 
+    @property
+    def scale_sigma(self) -> float:
+        """One standard deviation of `scale`, clustered by pose: 0 where the scale was not asked for."""
+        if not self.adjusted.also:
+            return 0.0
+        return self.scale * float(np.sqrt(self.adjusted.covariance[UNKNOWNS, UNKNOWNS]))
+
+    @property
+    def scale_known(self) -> bool:
+        """Whether the motions tell the scale: it is away from 0 by as much as a 95 % interval reaches."""
+        return bool(self.scale > self.times_sigma * self.scale_sigma)
+
     def _sigma(self, pose: RigidTransform, part: slice) -> tuple[Array, Array]:
         """Of a pose's rotation and translation: δt = ω × t + τ."""
         covariance = self.covariance[part, part]
@@ -176,8 +191,9 @@ def hand_eye(
     """X and Z of A X B = Z, from poses of a robot and poses of a board.
 
     A start in closed form (Park & Martin) from the triple of poses that most others agree with is refined over all
-    poses at once. A pose that is off by five times the median or more is set aside. How much a turn, a shift across the
-    picture, the board's distance and the robot's own poses count is learnt from what they leave.
+    poses at once. A pose is set aside where it is off by five times the median or more, and by more than chance. How
+    much a turn, a shift across the picture, the board's distance and the robot's own poses count is learnt from what
+    they leave.
 
     Args:
         base_from_hand: The robot's poses, in metres.
@@ -199,29 +215,35 @@ def hand_eye(
     np.True_
     """
     motions = Motions.of(base_from_hand, cam_from_board, eye_to_hand)
-    if any_scale:
-        return _resized(motions, eye_to_hand)
-    return _result(_started(motions), eye_to_hand, None)
+    return _resized(motions, eye_to_hand, None) if any_scale else _result(_started(motions), eye_to_hand, None)
 
 
-def _resized(motions: Motions, eye_to_hand: bool) -> HandEye:
-    """The solution with the camera's lengths multiplied by the factor of least squares."""
+def _resized(motions: Motions, eye_to_hand: bool, pixels: Pixels | None) -> HandEye:
+    """The solution with the camera's lengths, and the board, multiplied by the factor of least squares."""
+
+    def solved(first: Adjusted) -> HandEye:
+        return _result(first, eye_to_hand, pixels.resized(factor) if pixels else None)
+
     factor = 1 / start(motions, None)[2]
-    found = _result(_started(motions.resized(factor)), eye_to_hand, None)
+    found = solved(_started(motions.resized(factor)))
     for _ in range(MOST_RESIZED):
         shorter, sigma = found.adjusted.scale
         if not abs(shorter - 1) > SETTLED * sigma:
             break
         factor /= max(shorter, 0.1)
-        found = _result(
-            robust(motions.resized(factor), found.mount_from_cam, found.other_from_board), eye_to_hand, None
-        )
+        found = solved(robust(motions.resized(factor), found.mount_from_cam, found.other_from_board))
     adjusted = replace(found.adjusted, also=(found.adjusted.robot_lengths,))
     return replace(found, adjusted=adjusted, scale=factor)
 
 
 def hand_eye_from_corners(
-    base_from_hand: RigidTransform, pixels: ArrayLike, camera: Camera, board: Board, *, eye_to_hand: bool = False
+    base_from_hand: RigidTransform,
+    pixels: ArrayLike,
+    camera: Camera,
+    board: Board,
+    *,
+    eye_to_hand: bool = False,
+    any_scale: bool = False,
 ) -> HandEye:
     """`hand_eye` with the board's corners in place of its poses, refined through their reprojection errors.
 
@@ -236,6 +258,7 @@ def hand_eye_from_corners(
         camera: The calibrated camera.
         board: What the pictures show.
         eye_to_hand: The camera stands still and the board is on the hand.
+        any_scale: The board's lengths are not known. By what they must be multiplied is solved for with X and Z.
 
     Returns: X, Z, and the covariance clustered by pose.
 
@@ -260,14 +283,17 @@ def hand_eye_from_corners(
     alone = Camera(camera.intrinsics, camera.lens)
     cam_from_board = lone_poses(alone, board, corners[seen])
     motions = Motions.of(base_from_hand[seen], cam_from_board, eye_to_hand)
-    return spread_out(_result(_started(motions), eye_to_hand, Pixels(alone, board.corners, corners[seen])), seen)
+    measured = Pixels(alone, board.corners, corners[seen])
+    if any_scale:
+        return spread_out(_resized(motions, eye_to_hand, measured), seen)
+    return spread_out(_result(_started(motions), eye_to_hand, measured), seen)
 
 
 def spread_out(result: HandEye, seen: Mask) -> HandEye:
-    """A result of the poses `seen`, with `used` and `displacements` of all poses: False and NaN for the others."""
-    used, displacements = np.zeros(len(seen), bool), np.full(len(seen), np.nan)
-    used[seen], displacements[seen] = result.used, result.displacements
-    return replace(result, used=used, displacements=displacements)
+    """A result of the poses `seen`, with what is told of every pose told of all: False and NaN for the others."""
+    used, stray, displacements = np.zeros(len(seen), bool), np.zeros(len(seen), bool), np.full(len(seen), np.nan)
+    used[seen], stray[seen], displacements[seen] = result.used, result.stray, result.displacements
+    return replace(result, used=used, stray=stray, displacements=displacements)
 
 
 def _started(motions: Motions) -> Adjusted:
@@ -277,21 +303,33 @@ def _started(motions: Motions) -> Adjusted:
 
 def _result(first: Adjusted, eye_to_hand: bool, pixels: Pixels | None) -> HandEye:
     """The solution over the poses that do not contradict the others."""
-    stray = np.isin(np.arange(len(first.motions)), far_off(first.displacements))
-    few = stray.mean() <= MOST_STRAY and (~stray).sum() >= FEWEST
-    used: Mask = np.asarray(~stray if few else np.ones(len(stray), bool))
+    stray: Mask = np.asarray(np.isin(np.arange(len(first.motions)), far_off(first.displacements)))
+    stray &= (~stray).sum() >= FEWEST
+    best = _over(first, ~stray, eye_to_hand, pixels)
+    while stray.any():
+        sure = surely(best, first.motions, pixels, stray)
+        if (sure == stray).all():
+            break
+        stray = sure
+        best = _over(first, ~stray, eye_to_hand, pixels)
+    used: Mask = np.asarray(~stray | (stray.mean() > MOST_STRAY))
+    if stray.any() and used.all():
+        best = _over(first, used, eye_to_hand, pixels)
+    everywhere = replace(best, motions=first.motions, measured=first.measured, noise=None)
+    return HandEye(eye_to_hand, best, used, everywhere.displacements, stray)
+
+
+def _over(first: Adjusted, used: Mask, eye_to_hand: bool, pixels: Pixels | None) -> Adjusted:
+    """The solution over some poses, with the sizes of errors that they show."""
     best = replace(first, motions=first.motions.only(used), measured=first.measured.only(used), weights=None)
     best = best.refined()
     side = slice(6, 12) if eye_to_hand else slice(0, 6)
     if pixels is None:
-        best = weighed(best, side)
-    else:
-        best = replace(best, measured=pixels.only(used))
-        if not np.isfinite(best.cost):
-            raise PoseError("by the robot's poses some corners would lie where the camera has no image")
-        best = weighed_in_pixels(best, corner_noise(pixels.only(used), best.motions.cam_from_board), side)
-    everywhere = replace(best, motions=first.motions, measured=first.measured, noise=None)
-    return HandEye(eye_to_hand, best, used, everywhere.displacements)
+        return weighed(best, side)
+    best = replace(best, measured=pixels.only(used))
+    if not np.isfinite(best.cost):
+        raise PoseError("by the robot's poses some corners would lie where the camera has no image")
+    return weighed_in_pixels(best, corner_noise(pixels.only(used), best.motions.cam_from_board), side)
 
 
 def corner_noise(pixels: Pixels, cam_from_board: RigidTransform) -> float:

@@ -31,6 +31,7 @@ def solution(case: PosedPictures) -> list[str]:
         f"{found.x_name}: {_place(found)}",
         f"{found.x_name}: {_turn(found)}",
         f"{found.z_name}: {_board(found)}",
+        *([f"scale: {_scale(case)}"] if case.any_scale else []),
         _fit(found),
         f"± is one standard deviation, clustered by pose; an interval of 95 % reaches {found.times_sigma:.2f} of them "
         "to either side. Errors of the camera's own numbers are not in it.",
@@ -65,6 +66,7 @@ def result_tree(case: PosedPictures) -> dict[str, Any]:
         "sigmas_of_95_percent": found.times_sigma,
         "unknown_directions": [[float(x) for x in each] for each in found.unknown_directions],
         found.z_name: _pose_tree(found.other_from_board, found.known if len(found.unknown_directions) == 0 else None),
+        **({"scale": _scale_tree(case)} if case.any_scale else {}),
         "robot_errors": {"mm": 1000 * noise.shift, "deg": float(np.degrees(noise.turn))} if noise else None,
         "corner_noise_px": noise.px if noise else None,
         "rms_px": found.rms_px,
@@ -128,6 +130,31 @@ def _board(found: HandEye) -> str:
         )
     )
     return f"the board's first corner lies at {place} mm in the {other}'s frame."
+
+
+def _scale(case: PosedPictures) -> str:
+    found, side = case.result, 1000 * case.board.square_size
+    if not found.scale_known:
+        return "not known. The hand must move to other places, and not only turn about one."
+    times, sigma = found.scale, found.scale_sigma
+    return (
+        f"{times:.4f} ± {sigma:.4f}. In the robot's unit, which is that of all places told here, the board is so many "
+        f"times as large as told: {side * times:.3f} ± {side * sigma:.3f} mm in place of {side:.3f} mm."
+    )
+
+
+def _scale_tree(case: PosedPictures) -> dict[str, Any] | None:
+    """By what the board's lengths as told are multiplied to be in the robot's unit; None where it is not known."""
+    found, side = case.result, 1000 * case.board.square_size
+    if not found.scale_known:
+        return None
+    return {
+        "factor": found.scale,
+        "sigma": found.scale_sigma,
+        "of": "lengths of the board as told, to be in the unit of the robot's poses",
+        "square_mm": side * found.scale,
+        "square_sigma_mm": side * found.scale_sigma,
+    }
 
 
 def _fit(found: HandEye) -> str:

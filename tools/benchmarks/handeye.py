@@ -1,8 +1,8 @@
 """How often `camviz handeye` names what is wrong with a robot's poses, and how true its σ is: simulated cells.
 
-python benchmarks/handeye.py           50 cases of each fault, 50 healthy ones, and the table of intervals
-python benchmarks/handeye.py 10        fewer
-python benchmarks/handeye.py 50 one-axis nothing 15    some of the faults, the healthy cases, intervals of 15 poses
+python tools/benchmarks/handeye.py        50 cases of each fault, 50 healthy ones, and the table of intervals
+python tools/benchmarks/handeye.py 10     fewer
+python tools/benchmarks/handeye.py 50 one-axis nothing 15    these faults, healthy cases, intervals of 15 poses
 """
 
 from __future__ import annotations
