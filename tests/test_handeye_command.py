@@ -77,6 +77,7 @@ def test_json_is_strict_and_says_the_same(words, room, capsys):
     assert said["usable"] is True
 
 
+@pytest.mark.thorough
 def test_of_squares_that_are_told_too_long_the_scale_is_told_kept_and_no_fault(words, room, capsys):
     """Squares of 25 mm that are told as 30: by the robot they are 25, within three ±; and told as 25 the scale is 1."""
     given = [*words(), "--unknown-scale"]

@@ -100,6 +100,7 @@ def test_a_pose_that_is_off_by_30_of_the_robots_errors_is_sure_and_one_by_a_sing
         assert surely(solution, motions, pixels, stray).tolist() == (stray & sure).tolist()
 
 
+@pytest.mark.thorough
 def test_the_chance_is_that_of_all_poses_together():
     """Of 12 poses one is sure whose own chance is a twelfth of that of the whole set, and not one 0.1 mm nearer."""
     true = cell(np.random.default_rng(5), 12)
