@@ -54,7 +54,7 @@ def test_halves_need_three_views_each() -> None:
         halves(problem)
 
 
-@pytest.mark.thorough
+@pytest.mark.sampled(1)
 @pytest.mark.parametrize("folds", [None, 5])
 def test_corners_held_out_of_a_healthy_set_are_off_as_foretold(folds) -> None:
     """Ten sets of twelve views: the errors are those that noise, pose and camera should give, within 5 %."""
