@@ -76,8 +76,11 @@ def _run(block: str) -> str:
             printed.append([str(status)])
             continue
         name, *words = shlex.split(step.command)
+        if name == "cat" and len(words) == 1:
+            printed.append(Path(words[0]).read_text(encoding="utf-8").splitlines())
+            continue
         if name != "camviz":
-            raise ValueError(f"expected camviz … or echo $?, got {step.command}")
+            raise ValueError(f"expected camviz …, cat FILE or echo $?, got {step.command}")
         out = io.StringIO()
         with redirect_stdout(out), redirect_stderr(out):
             status = main(words)
