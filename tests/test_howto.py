@@ -77,5 +77,8 @@ def test_a_page_that_no_longer_agrees_shows_what_is_printed_now(tmp_path):
     assert status.lines == ("2",)
     with pytest.raises(ValueError, match=r"expected status 0, or echo \$\? below it, got 2"):
         console.renewed(text.format("$ camviz inspect a.yml\nold\n"), tmp_path)
-    with pytest.raises(ValueError, match=r"expected camviz … or echo \$\?, got ls"):
+    assert "$ cat a.yml\nnothing: 1\n```" in console.renewed(
+        "`a.yml`\n```yaml\nnothing: 1\n```\n\n```console\n$ cat a.yml\nold\n```\n", tmp_path
+    )
+    with pytest.raises(ValueError, match=r"expected camviz …, cat FILE or echo \$\?, got ls"):
         console.renewed("```console\n$ ls\n```\n", tmp_path)
