@@ -62,12 +62,12 @@ def beyond_their_sample(items):
     for item in items:
         if item.get_closest_marker("sampled"):
             cases.setdefault(item.nodeid.partition("[")[0], []).append(item)
-    return {item for each in cases.values() for item in each} - {
-        each[index * len(each) // wanted]
-        for each in cases.values()
-        for wanted in [min(each[0].get_closest_marker("sampled").args[0], len(each))]
-        for index in range(wanted)
-    }
+    left_out = set()
+    for each in cases.values():
+        wanted = each[0].get_closest_marker("sampled").args[0]
+        kept = {index * len(each) // wanted for index in range(wanted)}
+        left_out |= {item for index, item in enumerate(each) if index not in kept}
+    return left_out
 
 
 def needs_all(item):

@@ -25,7 +25,7 @@ from camviz_clinic.calibration import (
     solving,
 )
 from camviz_clinic.calibration.adjustment import Adjustment
-from camviz_clinic.calibration.chessboards import at_saddles
+from camviz_clinic.calibration.chessboards import at_saddles, crossed
 from camviz_clinic.calibration.detection import detect_pair
 from camviz_clinic.calibration.models import pose_from_rays
 from camviz_clinic.calibration.pairing import paired
@@ -112,6 +112,19 @@ def test_a_chessboard_with_a_narrow_margin_is_not_found_along_its_edge():
         true = cv2.perspectiveTransform(corners, H)[:, 0]
         found = find_corners(image, board)
         assert min(np.abs(found - true).max(), np.abs(found[::-1] - true).max()) < 1
+
+
+def test_noise_in_a_dim_picture_refuses_no_board():
+    """Fields that differ by 30 grey levels, with noise of 25 in each pixel; half a square beside, nothing crosses."""
+    board, side = Board(9, 6, 0.025), 40
+    fields = 60 + 30.0 * (np.add.outer(np.arange(7), np.arange(10)) % 2)
+    flat = np.pad(fields.repeat(side, axis=0).repeat(side, axis=1), side, constant_values=90)
+    corners = side - 0.5 + side * (1 + np.stack(np.meshgrid(np.arange(9), np.arange(6)), axis=-1).reshape(-1, 2))
+    rng = np.random.default_rng(0)
+    for _ in range(10):
+        image = np.clip(flat + rng.normal(0, 25, flat.shape), 0, 255).astype(np.uint8)
+        assert crossed(image, corners, board)
+        assert not crossed(image, corners + [side / 2, 0], board)
 
 
 def test_saddles_close_to_the_border_are_measured_in_a_smaller_window():

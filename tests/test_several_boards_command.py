@@ -133,6 +133,13 @@ def test_what_cannot_be_is_refused_in_one_sentence(empty_room, capsys, text, wor
     assert len(said.strip().splitlines()) == 1
 
 
+@pytest.mark.thorough
+def test_markers_of_another_dictionary_are_none_of_the_boards(room, capsys):
+    Path("bad.toml").write_text(FILE.replace("4X4", "6X6"), encoding="utf-8")
+    assert main(["calibrate", "wall/cam0", "--boards", "bad.toml", "--workers", "1", "-o", "out.yaml"]) == 2
+    assert "camera: none of the boards door, shelf, lamp, desk is in its 10 pictures" in capsys.readouterr().err
+
+
 def test_places_are_for_several_boards(empty_room, capsys):
     assert main(["calibrate", "cam0", "--board", "9x6", "--square-mm", "20", "--places", "out.toml"]) == 2
     assert "--places is for several boards: name them with --boards." in capsys.readouterr().err
