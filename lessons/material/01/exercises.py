@@ -1,4 +1,7 @@
-"""Lesson 01, the pinhole camera: projection and its inverse, the best hole, vanishing points, and what lies behind."""
+"""Lesson 01, the pinhole camera: its exercises, in one file because they are loaded by their lesson's number.
+
+Projection and its inverse, the best hole, vanishing points, and what lies behind.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Lesson 02, lenses: the image's place, the field of view with a bug in it, blur, its limits, and real elements.
+"""Lesson 02, lenses: its exercises, in one file because they are loaded by their lesson's number.
+
+The image's place, the field of view with a bug in it, blur, its limits, and real elements.
 
 Lengths in millimetres from the lens, as in `camviz.optics`.
 """

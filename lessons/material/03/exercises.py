@@ -1,4 +1,6 @@
-"""Lesson 03, intrinsics: the rays of pixels, the field of view, and K under resizing (with a bug in it) and cropping.
+"""Lesson 03, intrinsics: its exercises, in one file because they are loaded by their lesson's number.
+
+The rays of pixels, the field of view, and K under resizing (with a bug in it) and cropping.
 
 Pixel centres lie at integers, as everywhere in camviz and in OpenCV: an image spans -0.5 … width - 0.5. Answers are
 compared to a millionth, so that float32 is good enough; what is wrong here is wrong by a quarter of a pixel or more.

@@ -1,4 +1,6 @@
-"""Lesson 04, extrinsics: the camera's centre, a chain in the wrong order, what a rotation is, inverse, Rodrigues.
+"""Lesson 04, extrinsics: its exercises, in one file because they are loaded by their lesson's number.
+
+The camera's centre, a chain in the wrong order, what a rotation is, inverse, Rodrigues.
 
 A transform is named to_from_from and acts on column vectors: X_cam = R X_world + t. Answers are compared to a
 hundred-thousandth, for which float32 is good enough; what is wrong here is wrong by far more.
