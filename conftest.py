@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # a worker for each processor; and sums in one order on all
+os.environ.setdefault("OPENCV_FOR_THREADS_NUM", "1")  # each processor has its worker: OpenCV's threads would only wait
 
 import matplotlib
 import pytest

@@ -24,6 +24,24 @@ def run(*words, **options):
     )
 
 
+def on_a_full_disk(*words, **options):
+    """Python in a process that can write a file's first 1,000 bytes.
+
+    It keeps no compiled modules: Python keeps the part of them that fits, and no later process can import it.
+    """
+    import resource  # Windows has none, and skips what needs this
+
+    return subprocess.run(
+        [sys.executable, *words],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"},
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000)),
+        timeout=300,
+        **options,
+    )
+
+
 def refused(capsys, room, *words):
     """The one sentence of a refusal with status 2 that wrote nothing."""
     before = sorted(room.rglob("*"))

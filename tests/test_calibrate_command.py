@@ -1,7 +1,6 @@
 """`camviz calibrate` says what it did, and when it cannot, one sentence why, with nothing half written."""
 
 import os
-import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from commandline import on_a_full_disk
 from scipy.spatial.transform import RigidTransform, Rotation
 from test_calibration import BOARD, picture
 
@@ -134,8 +134,7 @@ def main_captured(words):
 def test_a_full_disk_leaves_what_was_there(room):
     shots(room / "shots")
     (room / "camera.yaml").write_text("what was there")
-    limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))  # noqa: E731
-    done = run("shots", *WORDS, "--workers", "1", cwd=room, preexec_fn=limit)
+    done = on_a_full_disk("-m", "camviz", "calibrate", "shots", *WORDS, "--workers", "1", cwd=room)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == "camviz: camera.yaml: cannot be written (File too large).\n"
     assert (room / "camera.yaml").read_text() == "what was there"

@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import resource
 import shutil
 import stat
 import subprocess
@@ -12,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commandline import ROOT, refused
+from commandline import ROOT, on_a_full_disk, refused
 
 import camviz_clinic
 from camviz_clinic.commands import terminal
@@ -199,15 +198,7 @@ def test_what_only_its_owner_may_read_stays_so(room, capsys, words):
 def test_lessons_on_a_full_disk_leave_no_part_and_are_named(room):
     program = "from pathlib import Path; from camviz_school.course.working_copy import lay_out\n"
     program += f"lay_out(Path({str(ROOT / 'lessons')!r}), Path('copy'), '1')"
-    limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))  # noqa: E731
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        capture_output=True,
-        text=True,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        preexec_fn=limit,
-        check=False,
-    )
+    done = on_a_full_disk("-c", program)
     assert "File too large: 'copy/" in done.stderr.splitlines()[-1]
     assert [path.name for path in (room / "copy").rglob("*") if path.name.startswith(".")] == []
 
