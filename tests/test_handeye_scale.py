@@ -86,6 +86,7 @@ def test_where_the_scale_is_solved_for_neither_unit_nor_squares_are_judged_and_i
     assert "scale-differs" in [each.id for each in replace(found, any_scale=False).findings]
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("id", [each for each in FAULTS if each not in ("wrong-unit", "scale-differs")])
 def test_other_faults_are_named_though_the_scale_is_not_known(id):
     given = FAULTS[id](np.random.default_rng([777, 1]))

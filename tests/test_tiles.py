@@ -46,6 +46,7 @@ def unit_on_a_telephone(tile: Tile) -> float:
     return max(1.0, width / (560 if width > SCROLLED else TELEPHONE))
 
 
+@pytest.mark.sampled(32)
 @pytest.mark.parametrize("name", STATES)
 def test_words_stand_free_at_both_ends_of_every_control(name):
     for view in ends(STATES[name]()):

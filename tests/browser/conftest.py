@@ -42,7 +42,7 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         yield address
 
 
-OPENED = ("00", "05", "08", "13", "16")
+OPENED = ("00", "05", "16")
 """The lessons that are opened without --all: nbval runs every one, and each view has its own tests."""
 
 

@@ -3,7 +3,7 @@
 import shutil
 
 import pytest
-from laboratory import ROOT, jupyterlab
+from laboratory import LATE_MS, ROOT, jupyterlab
 
 from camviz.draw import prose
 from camviz_school.course.questions import question
@@ -27,6 +27,7 @@ FOCUSED = """root => {
   const outlined = outlineStyle !== "none" && parseFloat(outlineWidth) >= 2;
   return outlined ? Number(one.dataset.stop) : `no outline: ${one.outerHTML}`;
 }"""
+PAUSE_MS = 250
 LAST = "Lens distortion, 8"  # the one that has every kind of control
 
 
@@ -208,8 +209,12 @@ class Tree:
         return [one for one in visit(top["nodeId"]) if not one["ignored"]]
 
     def group(self, name):
-        """All within the group of that name."""
-        (top,) = [one for one in self.every() if told(one, "role") == "group" and told(one) == name]
+        """All within the group of that name, once the tree has it: it follows the page by a moment."""
+        for _ in range(LATE_MS // PAUSE_MS):
+            if found := [one for one in self.every() if told(one, "role") == "group" and told(one) == name]:
+                break
+            self._page.wait_for_timeout(PAUSE_MS)
+        (top,) = found
         return self.below(top)
 
     def one(self, group, role, name):

@@ -4,7 +4,7 @@ import json
 import re
 
 import pytest
-from laboratory import FRONT_ENDS, NOTEBOOKS_OWN, Notebook, jupyter
+from laboratory import NOTEBOOKS_OWN, Notebook, jupyter
 
 pytestmark = pytest.mark.browser
 
@@ -25,7 +25,7 @@ NEW_KERNEL = """async () => {
 KERNEL = "jupyterapp.shell.currentWidget.sessionContext.session.kernel"
 
 
-@pytest.fixture(scope="module", params=FRONT_ENDS)
+@pytest.fixture(scope="module", params=["JupyterLab", pytest.param("Notebook 7", marks=pytest.mark.thorough)])
 def opened(request, browser, tmp_path_factory):
     """Two visualizers of one name, on a touch screen."""
     home = tmp_path_factory.mktemp("controls")

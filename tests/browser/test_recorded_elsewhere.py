@@ -76,6 +76,7 @@ def shows(place: Any, made: Made, sines: int) -> None:
 
 
 def to_both_ends(slider: Locator) -> Iterator[int]:
+    slider.wait_for()  # what is not shown yet takes no key
     for key, sines in (("End", 20), ("Home", 1)):
         slider.press(key)
         yield sines
@@ -112,7 +113,9 @@ def test_modules_move_as_myst_draws_them_each_in_a_root_that_the_page_s_style_do
     page = opened(browser, made.address + "/myst.html")
     for sines in to_both_ends(page.locator("#one label input")):
         shows(page.locator("#one"), made, sines)
-    page.locator("#two input[type=range]").press("End")
+    slider = page.locator("#two input[type=range]")
+    slider.wait_for()
+    slider.press("End")
     page.locator("#two .camviz-recorded-line").get_by_text("Shown: k1 1.").wait_for()
     photograph = page.locator("#two svg image").first
     assert photograph.get_attribute("href").startswith("data:image/webp;base64,")

@@ -25,7 +25,7 @@ SLACK = 24  # levels of 255 by which a pixel may be off the range of the other p
 AROUND = np.ones((3, 3), np.uint8)  # pixels: how far antialiasing and a letter's hinting reach
 
 
-@pytest.fixture(scope="module", params=["light", "dark"])
+@pytest.fixture(scope="module", params=["light", pytest.param("dark", marks=pytest.mark.thorough)])
 def page(request, browser: Browser):
     page = new_page(browser, viewport={"width": 1000, "height": 1000}, color_scheme=request.param)
     page.theme = request.param

@@ -163,6 +163,7 @@ def test_without_a_script_and_on_paper_all_slides_stand_one_below_the_other(brow
     page.close()
 
 
+@pytest.mark.sampled(8)
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
 def test_nothing_leaves_its_slide(browser, tmp_path, path):
     """On a projector, on an old one of 4:3, and on paper."""
