@@ -24,12 +24,11 @@ _NEGATED = re.compile(r":not\([^()]*\)")
 _WORD = re.compile(r"[A-Za-z_][\w-]*")
 _NESTED = ("media", "supports", "layer", "container")
 _ICON_FONT = "Font Awesome"
-UNCOLOURED = ("n", "nn", "p", "w", "o")
-"""Pygments' classes of code that have the colour of text: by both of the site's styles, and operators by our choice.
-
-A fifth of lesson 16's elements would be there to colour the dots and signs between its words.
-"""
-_UNCOLOURED = re.compile(rf'<span class="(?:{"|".join(UNCOLOURED)})">([^<]*)</span>')
+UNCOLOURED = ("n", "nn", "p", "w")
+"""Pygments' classes of code that both of the site's styles leave in the colour of text."""
+OPERATORS = "o"
+"""Pygments' class of dots and signs between words; a fifth of lesson 16's elements would only colour them."""
+_UNCOLOURED = re.compile(rf'<span class="(?:{"|".join([*UNCOLOURED, OPERATORS])})">([^<]*)</span>')
 _MENDED = {  # in the pages: folds with no name or one that nobody sees, and a role of docutils that ARIA has withdrawn
     '<summary><span class="toctree-toggle"': '<summary aria-label="Pages below"><span class="toctree-toggle"',
     '<summary aria-label="Toggle hidden content">': "<summary>",
@@ -67,7 +66,7 @@ def _mend(pages: dict[Path, str], digest: str) -> None:
 
 
 def without_uncoloured(html: str) -> str:
-    """The page without the elements around code that has no colour: four in ten of a lesson's elements.
+    """The page without the elements around operators and code that has no colour: half of a lesson's elements.
 
     >>> without_uncoloured('<span class="n">x</span><span class="p">,</span> <span class="mi">1</span>')
     'x, <span class="mi">1</span>'
