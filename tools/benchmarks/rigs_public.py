@@ -27,40 +27,33 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-import shutil
-import subprocess
 import sys
 import tempfile
 import time
 import tomllib
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
-from field import FAILURES, FOLDS, LIMIT_S, MRCAL, by_opencv
+from field import FAILURES, FOLDS
 from kernel import table
-from rigs import calibrated_by_opencv, pairs
+from rig_programs import MODEL, PROGRAMS, Found, Rig
+from rigs import pairs
 
-from camviz.cameras import Camera
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration import Detections, detect
 from camviz_clinic.calibration.detection import seen
 from camviz_clinic.calibration.finding import find_corners
 from camviz_clinic.calibration.types import Board
-from camviz_clinic.files import load
 from camviz_clinic.rigs import calibrate_rig, relative_pose, rig_of, synchronised
 from camviz_clinic.rigs.adjustment import RigAdjustment
 from camviz_clinic.rigs.start import board_poses
 
 MANIFEST = Path(__file__).with_name("rigs_public.toml")
-MODEL = "standard"
 WILD = 5.0  # pixels
 FEWEST = 4  # corners that make a view
 NORMAL_95 = 1.96
-Found = dict[str, Detections]
-Rig = dict[str, Camera]
 
 
 @dataclass(frozen=True)
@@ -186,50 +179,6 @@ def keep(path: Path, found: Found) -> None:
             f"{name}.places": each.places,
         }
     np.savez(path, **arrays)
-
-
-# The programs: from corners to a rig ----------------------------------------------------------------------------------
-
-
-def rig_by_camviz(found: Found, board: Board) -> Rig:
-    """`camviz calibrate --rig` as it comes."""
-    return calibrate_rig(found, board, MODEL, board_warp="auto").cameras
-
-
-def rig_by_opencv(found: Found, board: Board) -> Rig:
-    """cv2.calibrateCamera by all corners, and cv2.calibrateMultiview by those that all cameras of a frame see."""
-    held = {name: by_opencv(each, board, MODEL) for name, each in found.items()}
-    rig = calibrated_by_opencv(found, board, dict.fromkeys(found, MODEL), held)
-    if rig is None:
-        raise ValueError("cv2.calibrateMultiview fails")
-    return rig
-
-
-def rig_by_mrcal(found: Found, board: Board) -> Rig:
-    """mrcal-calibrate-cameras as it comes, from OpenCV's focal length."""
-    focal = np.median([by_opencv(each, board, MODEL).intrinsics.fx for each in found.values()])
-    rows = ["# filename x y level"]
-    for camera, each in enumerate(found.values()):
-        for place, corners in zip(each.places, each.corners, strict=True):
-            name = f"cam{camera}-frame{place:04d}.png "
-            rows += [name + (f"{u} {v} 0" if np.isfinite(u) else "0 0 -") for u, v in corners]
-    size = {f"{each.width} {each.height}" for each in found.values()}
-    with tempfile.TemporaryDirectory() as folder:
-        Path(folder, "corners.vnl").write_text("\n".join(rows) + "\n", encoding="utf-8")
-        command = f"mrcal-calibrate-cameras --corners-cache corners.vnl --lensmodel {MRCAL[MODEL]} --focal {focal} "
-        command += f"--object-spacing {board.square_size} --object-width-n {board.columns} "
-        command += f"--object-height-n {board.rows} --imagersize {' '.join(size)} "
-        command += " ".join(f"cam{camera}-frame*.png" for camera in range(len(found)))
-        subprocess.run(command.split(), cwd=folder, capture_output=True, check=True, timeout=LIMIT_S)
-        files = [Path(folder, f"camera-{camera}.cameramodel") for camera in range(len(found))]
-        return {name: next(iter(load(path).cameras.values())) for name, path in zip(found, files, strict=True)}
-
-
-PROGRAMS: dict[str, Callable[[Found, Board], Rig]] = {"camviz": rig_by_camviz}
-if hasattr(cv2, "calibrateMultiview"):  # from 5.0 on
-    PROGRAMS["OpenCV"] = rig_by_opencv
-if shutil.which("mrcal-calibrate-cameras"):
-    PROGRAMS["mrcal"] = rig_by_mrcal
 
 
 # The held-out error ---------------------------------------------------------------------------------------------------
