@@ -9,10 +9,12 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz_clinic.calibration import CannotCalibrate, Detections
 from camviz_clinic.calibration.adjustment import Adjustment, twisted
-from camviz_clinic.rigs import calibrate_rig, in_frames, relative_pose, rig_of, synchronised, virtual
+from camviz_clinic.calibration.detection import seen
+from camviz_clinic.rigs import calibrate_rig, in_frames, relative_pose, rig_of, solving, synchronised, virtual
 from camviz_clinic.rigs.adjustment import RigAdjustment
 from camviz_clinic.rigs.graph import Link, adjoint, chained, islands, parted
 from camviz_clinic.rigs.rejection import deviation, limit
+from camviz_clinic.rigs.start import alone, begun, spread_out
 
 
 def of(truth, name, seen_from):
@@ -330,3 +332,29 @@ def test_a_distance_and_its_deviation_are_of_the_same_direction():
     assert beside.distance_deviation == pytest.approx(0.001 * np.sqrt(0.36 + 0.64 * 4))
     assert beside.angle == pytest.approx(0.5)
     assert beside.angle_deviation == pytest.approx(0.02)
+
+
+def test_views_that_went_first_come_back_where_the_lens_is_wild_without_them(monkeypatch):
+    rng = np.random.default_rng(0)
+    truth = virtual.rig(rng, 2, frames=20, shared=1.0)
+    found = truth.observed(rng)
+    seen_by = found["cam1"]
+    corners = seen_by.corners + rng.normal(0, 0.6, seen_by.corners.shape)
+    radii = np.linalg.norm(corners - [seen_by.width / 2, seen_by.height / 2], axis=-1)
+    order = np.argsort(np.nanmax(radii, axis=1))
+    inner, outer = order[:5], order[-3:]
+    for view in inner:  # what five views tell of the middle of the picture says nothing of its border
+        corners[view][radii[view] > 170] = np.nan
+    found["cam1"] = replace(seen_by, corners=corners).only(sorted([*inner, *outer]))
+    frames = sorted({place for each in found.values() for place in each.places})
+    lone = {
+        name: spread_out(alone(each, truth.board, "standard", (), True, None), list(map(frames.index, each.places)),
+                         len(frames)) for name, each in found.items()
+    }  # fmt: skip
+    start = begun(lone, truth.board)
+    rows = [frames.index(seen_by.places[view]) for view in outer]
+    gone = {name: np.zeros(each.shape[:2], dtype=bool) for name, each in start.detections.items()}
+    gone["cam1"][rows] = seen(start.detections["cam1"][rows])
+    assert np.array_equal(solving._judged(replace(start, set_aside=gone)).set_aside["cam1"], gone["cam1"])
+    monkeypatch.setattr(solving, "hopeless", lambda adjustment: gone)
+    assert not solving.judged(start).set_aside["cam1"].any()

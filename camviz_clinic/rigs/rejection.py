@@ -65,6 +65,16 @@ def outliers(adjustment: RigAdjustment, *, at_first: bool = False) -> Masks:
     return found
 
 
+def more_agree(one: RigAdjustment, other: RigAdjustment) -> bool:
+    """Whether more corners lie within the narrower limit of two solutions in the one than in the other."""
+    counts = [0, 0]
+    for name in one.cameras:
+        narrow = min(limit(one, name), limit(other, name))
+        for place, each in enumerate((one, other)):
+            counts[place] += int(np.sum(_distances(each, name) <= narrow))
+    return counts[0] > counts[1]
+
+
 def sentences(adjustment: RigAdjustment) -> tuple[str, ...]:
     """What was set aside of each camera, in words."""
     said = []

@@ -18,7 +18,7 @@ from camviz_clinic.calibration.solving import FOLDED
 from camviz_clinic.calibration.types import Board, Calibration, Mask
 from camviz_clinic.rigs.adjustment import RigAdjustment
 from camviz_clinic.rigs.graph import islands, parted
-from camviz_clinic.rigs.rejection import hopeless, outliers, sentences
+from camviz_clinic.rigs.rejection import hopeless, more_agree, outliers, sentences
 from camviz_clinic.rigs.start import alone, begun, spread_out
 
 MOST_ROUNDS = 12
@@ -110,8 +110,22 @@ def _check(
 
 
 def judged(start: Solution) -> Solution:
-    """Solved, judged and solved again until no corner changes sides."""
-    adjustment = replace(start, set_aside=_together(start.set_aside, hopeless(start)))
+    """Solved, judged and solved again until no corner changes sides.
+
+    Where whole views go, this is done again from a solution by all of them, and the one that more corners agree with is
+    taken: a lens bends wildly where it has no corners, so that views that went first may never come back.
+    """
+    careful = _judged(replace(start, set_aside=_together(start.set_aside, hopeless(start))))
+    if not any(np.any(mask.any(axis=1) & ~careful.used[name].any(axis=1)) for name, mask in careful.set_aside.items()):
+        return careful
+    try:
+        trusting = _judged(start)
+    except CannotCalibrate:
+        return careful
+    return trusting if more_agree(trusting, careful) else careful
+
+
+def _judged(adjustment: Solution) -> Solution:
     for turn in range(MOST_ROUNDS):
         adjustment = settled(adjustment)
         found = outliers(adjustment, at_first=turn == 0)

@@ -1,4 +1,4 @@
-"""How well rigs are calibrated from other people's pictures, beside OpenCV and mrcal, with truth where there is some.
+"""How well rigs are calibrated from other people's pictures, beside other programs, and the truth where it is known.
 
     CAMVIZ_FIELD=~/field python tools/benchmarks/rigs_public.py             runs every set, as Markdown tables
     CAMVIZ_FIELD=~/field python tools/benchmarks/rigs_public.py NAME …      runs these sets
@@ -12,7 +12,9 @@ where this one finds it.
 Every fifth frame is held out, the others give the rig: five times, until each frame was held out once. In a held-out
 frame that two cameras or more see, only the board's one pose is fitted, the rig and its lenses held. The held-out error
 is the RMS distance of all corners of these frames, in pixels, the board flat for everyone. Behind the stroke it is that
-of corners within WILD pixels in the solutions of all programs, which a wrongly found corner does not rule.
+of corners within WILD pixels in the solutions of all programs, which a wrongly found corner does not rule. Of films a
+second table has the error of all corners apart for frames in which the board moves by less or more than FAST pixels
+from one to the next: a moving board is in another place for each camera, and for each row of a rolling shutter.
 
 A program fails in a fold in which it gives no rig, or one that is off by more than WILD pixels in the median. Such a
 program has no number, and has no say in which corners are kept.
@@ -27,40 +29,34 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-import shutil
-import subprocess
 import sys
 import tempfile
 import time
 import tomllib
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
-from field import FAILURES, FOLDS, LIMIT_S, MRCAL, by_opencv
+from field import FAILURES, FOLDS
 from kernel import table
-from rigs import calibrated_by_opencv, pairs
+from rig_programs import MODEL, PROGRAMS, Found, Rig
+from rigs import pairs
 
-from camviz.cameras import Camera
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration import Detections, detect
 from camviz_clinic.calibration.detection import seen
 from camviz_clinic.calibration.finding import find_corners
 from camviz_clinic.calibration.types import Board
-from camviz_clinic.files import load
 from camviz_clinic.rigs import calibrate_rig, relative_pose, rig_of, synchronised
 from camviz_clinic.rigs.adjustment import RigAdjustment
 from camviz_clinic.rigs.start import board_poses
 
 MANIFEST = Path(__file__).with_name("rigs_public.toml")
-MODEL = "standard"
 WILD = 5.0  # pixels
+FAST = 25.0  # pixels
 FEWEST = 4  # corners that make a view
 NORMAL_95 = 1.96
-Found = dict[str, Detections]
-Rig = dict[str, Camera]
 
 
 @dataclass(frozen=True)
@@ -188,50 +184,6 @@ def keep(path: Path, found: Found) -> None:
     np.savez(path, **arrays)
 
 
-# The programs: from corners to a rig ----------------------------------------------------------------------------------
-
-
-def rig_by_camviz(found: Found, board: Board) -> Rig:
-    """`camviz calibrate --rig` as it comes."""
-    return calibrate_rig(found, board, MODEL, board_warp="auto").cameras
-
-
-def rig_by_opencv(found: Found, board: Board) -> Rig:
-    """cv2.calibrateCamera by all corners, and cv2.calibrateMultiview by those that all cameras of a frame see."""
-    held = {name: by_opencv(each, board, MODEL) for name, each in found.items()}
-    rig = calibrated_by_opencv(found, board, dict.fromkeys(found, MODEL), held)
-    if rig is None:
-        raise ValueError("cv2.calibrateMultiview fails")
-    return rig
-
-
-def rig_by_mrcal(found: Found, board: Board) -> Rig:
-    """mrcal-calibrate-cameras as it comes, from OpenCV's focal length."""
-    focal = np.median([by_opencv(each, board, MODEL).intrinsics.fx for each in found.values()])
-    rows = ["# filename x y level"]
-    for camera, each in enumerate(found.values()):
-        for place, corners in zip(each.places, each.corners, strict=True):
-            name = f"cam{camera}-frame{place:04d}.png "
-            rows += [name + (f"{u} {v} 0" if np.isfinite(u) else "0 0 -") for u, v in corners]
-    size = {f"{each.width} {each.height}" for each in found.values()}
-    with tempfile.TemporaryDirectory() as folder:
-        Path(folder, "corners.vnl").write_text("\n".join(rows) + "\n", encoding="utf-8")
-        command = f"mrcal-calibrate-cameras --corners-cache corners.vnl --lensmodel {MRCAL[MODEL]} --focal {focal} "
-        command += f"--object-spacing {board.square_size} --object-width-n {board.columns} "
-        command += f"--object-height-n {board.rows} --imagersize {' '.join(size)} "
-        command += " ".join(f"cam{camera}-frame*.png" for camera in range(len(found)))
-        subprocess.run(command.split(), cwd=folder, capture_output=True, check=True, timeout=LIMIT_S)
-        files = [Path(folder, f"camera-{camera}.cameramodel") for camera in range(len(found))]
-        return {name: next(iter(load(path).cameras.values())) for name, path in zip(found, files, strict=True)}
-
-
-PROGRAMS: dict[str, Callable[[Found, Board], Rig]] = {"camviz": rig_by_camviz}
-if hasattr(cv2, "calibrateMultiview"):  # from 5.0 on
-    PROGRAMS["OpenCV"] = rig_by_opencv
-if shutil.which("mrcal-calibrate-cameras"):
-    PROGRAMS["mrcal"] = rig_by_mrcal
-
-
 # The held-out error ---------------------------------------------------------------------------------------------------
 
 
@@ -312,10 +264,12 @@ def folds(found: Found, board: Board) -> tuple[dict[str, np.ndarray], dict[str, 
     return {name: np.concatenate(each) for name, each in squares.items()}, seconds, failed
 
 
-def row(one: Set, found: Found) -> list[str]:
+def row(
+    one: Set, found: Found, squares: dict[str, np.ndarray], seconds: dict[str, float], failed: dict[str, int]
+) -> list[str]:
     """The line of a set in the table."""
-    squares, seconds, failed = folds(found, one.of_board)
     solved = {name: each for name, each in squares.items() if not failed[name]}
+    corners = np.isfinite(next(iter(solved.values()))).sum() if solved else 0
     tame = np.all([each <= WILD**2 for each in solved.values()], axis=0)
     rms = {name: float(np.sqrt(np.nanmean(each))) for name, each in solved.items()}
     kept = {name: float(np.sqrt(np.mean(each[tame]))) for name, each in solved.items()}
@@ -325,10 +279,33 @@ def row(one: Set, found: Found) -> list[str]:
     behind = [f"{100 * (each['camviz'] / min(each[name] for name in others) - 1):+.1f}" for each in (rms, kept)
               if others and "camviz" in solved]  # fmt: skip
     views = sum(len(each.places) for each in found.values())
-    wild = 1 - tame.sum() / np.isfinite(next(iter(solved.values()))).sum()
+    wild = f"{1 - tame.sum() / corners:.1%}" if corners else "–"
     size = next(iter(found.values()))
     told = f"{len(found)}, {views} views, {len(shared(found))} frames shared, {size.width} × {size.height}"
-    return [one.name, told, *cells, f"{' / '.join(behind)} %" if behind else "–", f"{wild:.1%}"]
+    return [one.name, told, *cells, f"{' / '.join(behind)} %" if behind else "–", wild]
+
+
+def moves(found: Found) -> np.ndarray:
+    """By how many pixels the board moves from each shared frame to the next or from the last one, in order of folds.
+
+    It is the median of a view's corners in the camera where this is most; NaN where the frames beside were not seen.
+    """
+    views = [dict(zip(each.places, each.corners, strict=True)) for each in found.values()]
+    frames = shared(found)
+    most = []
+    for frame in (each for first in range(FOLDS) for each in frames[first::FOLDS]):
+        beside = [each[other] - each[frame] for each in views for other in (frame - 1, frame + 1)
+                  if frame in each and other in each]  # fmt: skip
+        most.append(max((float(np.nanmedian(np.linalg.norm(one, axis=-1))) for one in beside), default=np.nan))
+    return np.array(most)
+
+
+def by_motion(one: Set, found: Found, squares: dict[str, np.ndarray], failed: dict[str, int]) -> list[str]:
+    """The line of a film in the second table: the held-out errors in frames below FAST, and from there on."""
+    fast = moves(found) >= FAST
+    cells = [" / ".join(f"{np.sqrt(np.nanmean(each[which])):.3f}" for which in (~fast, fast) if which.any())
+             if not failed[name] else "–" for name, each in squares.items()]  # fmt: skip
+    return [one.name, f"{np.sum(~fast)} / {np.sum(fast)}", *cells]
 
 
 # Beside the truth -----------------------------------------------------------------------------------------------------
@@ -373,7 +350,7 @@ def main(arguments: list[str]) -> None:
     """Run what is there."""
     cv2.setNumThreads(1)
     names = {each for each in arguments if not each.startswith("-")}
-    lines, true = [], []
+    lines, films, true = [], [], []
     for one in sets():
         if names and one.name not in names:
             continue
@@ -389,13 +366,18 @@ def main(arguments: list[str]) -> None:
             except FAILURES as failure:
                 print(f"{one.name}: {failure}", file=sys.stderr, flush=True)
                 continue
-            lines.append(row(one, found))
+            squares, seconds, failed = folds(found, one.of_board)
+            lines.append(row(one, found, squares, seconds, failed))
             print(" | ".join(lines[-1]), file=sys.stderr, flush=True)
+            if one.path.endswith(".mp4"):
+                films.append(by_motion(one, found, squares, failed))
             if one.truth:
                 true.append(beside_truth(one, found))
     if lines:
         head = ["set", "cameras", *PROGRAMS, "against the better one", f"corners beyond {WILD:g} px"]
         print(table(head, lines))
+    if films:
+        print(table(["film", f"frames below / from {FAST:g} px", *PROGRAMS], films))
     if true:
         print(table(["set", *PROGRAMS, "within 3 / 1.96 ±", "RMS in ±"], true))
 
