@@ -98,6 +98,22 @@ def test_damage_within_a_film_names_the_frame_before_it_and_the_rest_is_read(sho
     assert abs(named - where) <= (3 if name != "film.mp4" else count // 5)  # mp4v's frames differ much in size
 
 
+def test_a_hole_in_a_short_film_is_damage_and_no_variable_rate(shot, tmp_path):
+    pictures = shot.pictures[:40]
+    written(tmp_path / "short.mp4", pictures, "mp4v")
+    broken = bytearray((tmp_path / "short.mp4").read_bytes())
+    at, size = len(broken) // 2, len(broken) // 6
+    broken[at : at + size] = np.random.default_rng(3).bytes(size)
+    (tmp_path / "short.mp4").write_bytes(broken)
+    frames, film = read(tmp_path / "short.mp4")
+    assert 3 <= 40 - len(frames) <= 12
+    gap = int(np.argmax(np.diff([frame.time_s for frame in frames])))
+    assert film.notes == [
+        f"{40 - len(frames)} of its 40 frames cannot be read, the first after frame {gap} ({gap / 8:.2f} s), where the "
+        "film is damaged; the others were used."
+    ]
+
+
 def test_a_recording_without_its_index_is_refused_in_words_that_say_so(shot, tmp_path):
     whole = (shot.folder / "film.mp4").read_bytes()
     (tmp_path / "cut.mp4").write_bytes(whole[: len(whole) // 2])

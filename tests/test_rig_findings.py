@@ -108,6 +108,11 @@ def test_one_frame_in_common_is_named_and_two_are_not():
         assert set(found(checks.one_frame.inject(np.random.default_rng(75), count))) == named
 
 
+def test_a_board_that_wobbles_on_its_turntable_as_a_hand_does_is_turned_about_more_than_one_axis():
+    for degrees, named in ((1, {"rig-one-axis"}), (3, set())):
+        assert set(found(checks.turntable.inject(np.random.default_rng(70), degrees))) == named
+
+
 def test_a_single_camera_is_not_checked_as_a_rig():
     evidence = Evidence(healthy(np.random.default_rng(1)))
     for kind in KINDS:

@@ -57,6 +57,16 @@ def test_a_board_that_was_not_asked_for_is_named_with_the_options_that_ask_for_i
         detect(taken(kind), Board(11, 7, 0.02), **QUICK)
 
 
+@pytest.mark.parametrize("kind", ["charuco", "aprilgrid"])
+def test_mirrored_pictures_are_named_as_such(kind, taken, tmp_path):
+    paths = [tmp_path / path.name for path in taken(kind)]
+    for path, original in zip(paths, taken(kind), strict=True):
+        cv2.imwrite(str(path), cv2.imread(str(original))[:, ::-1])
+    said = "view0.png and view1.png show this board mirrored: turn off the camera's mirroring, or flip them left to right"
+    with pytest.raises(CannotCalibrate, match=said):
+        detect(paths, SHOWN[kind][0], **QUICK)
+
+
 def test_a_part_of_a_larger_board_is_not_taken_for_the_board(taken):
     """Of 8×5 corners 6×4 could be found; beyond them the squares go on, beyond all of them they do not."""
     whole, part = SHOWN["chessboard"][0], Board(6, 4, 0.028)

@@ -13,11 +13,13 @@ from camviz.colour.picture_files import PictureError, read_gray
 from camviz.lenses.base import Array
 from camviz_clinic.calibration.boards import Shape, kind_of
 from camviz_clinic.calibration.chessboards import goes_on
+from camviz_clinic.calibration.finding import find_corners
 from camviz_clinic.calibration.guesses import guesses
 
 LOOKED_AT = 6  # pictures, spread over all of them
 LARGEST = 1000  # pixels along the longer side of what is looked at
 NAMED = 3
+OF_MARKERS = ("aprilgrid", "charuco", "markers")
 
 Gray = NDArray[np.uint8]
 
@@ -25,11 +27,14 @@ Gray = NDArray[np.uint8]
 def another_board(paths: Sequence[str | PathLike[str]], names: Sequence[str], board: Shape) -> str:
     """What pictures show in which `board` was not found: "left01.jpg … show what looks like a …: try …", or nothing.
 
-    Two pictures must agree, unless there is but one.
+    A board of markers may be there in a mirror's image. Two pictures must agree, unless there is but one.
     """
     votes: dict[str, list[str]] = {}
     says = {}
     chosen = _spread(len(paths))
+    mirrored = [names[place] for place in chosen if _mirrored(_gray(paths[place]), board)]
+    if mirrored and len(mirrored) >= min(2, len(chosen)):
+        return f"{_listed(mirrored)} this board mirrored: turn off the camera's mirroring, or flip them left to right"
     for place in chosen:
         gray = _gray(paths[place])
         guess = next(guesses(_smaller(gray)), None) if gray is not None else None
@@ -64,6 +69,13 @@ def part_of_a_larger(
     seen = another_board([paths[place] for place in more], [names[place] for place in more], board)
     rest = f": {seen}" if seen else ": count all corners where four squares meet"
     return f"{_listed([names[place] for place in more])} more squares than a {kind_of(board).says(board)} has{rest}"
+
+
+def _mirrored(gray: Gray | None, board: Shape) -> bool:
+    """Whether a picture shows the board flipped left to right; squares and circles look alike then, markers do not."""
+    if gray is None or kind_of(board).name not in OF_MARKERS:
+        return False
+    return find_corners(np.ascontiguousarray(gray[:, ::-1]), board, "classic") is not None
 
 
 def _gray(path: str | PathLike[str]) -> Gray | None:

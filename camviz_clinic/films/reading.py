@@ -191,7 +191,7 @@ class Film:
                 f"the film ends at frame {len(times) - 1} of {self.count} ({times[-1]:.2f} s), where it is damaged or "
                 "was interrupted; what comes before was used."
             )
-        if (np.abs(gaps - usual) > EVEN * usual).sum() > OFTEN * len(gaps):
+        if (np.abs(gaps - usual) > EVEN * usual).sum() > _few(gaps):
             told.append(
                 f"its frames are {1000 * gaps.min():.0f} to {1000 * gaps.max():.0f} ms apart (a variable rate): they "
                 "are taken at their own times."
@@ -202,9 +202,14 @@ class Film:
         """After which frame others are missing within the film: where its clock jumps, or an AVI's chunks break off."""
         missing = self.count - len(times)
         wide = np.flatnonzero(gaps > (1 + EVEN) * usual)
-        if missing > 0 and 0 < len(wide) <= min(missing, OFTEN * len(gaps)):
+        if missing > 0 and 0 < len(wide) <= min(missing, _few(gaps)):
             return int(wide[0])
         return broken_chunk(self.path) if missing > 0 else None
+
+
+def _few(gaps: NDArray[np.float64]) -> float:
+    """How many of the gaps may be uneven in a film whose rate does not vary: one in a short film, too."""
+    return max(OFTEN * len(gaps), 1)
 
 
 def _refuse_no_film(path: Path) -> None:

@@ -3,7 +3,8 @@
     python tools/benchmarks/rigs.py            20 rigs of every kind, as Markdown tables
     python tools/benchmarks/rigs.py N WORD     N rigs of the kinds with that word in their name
     python tools/benchmarks/rigs.py --large    8 cameras and 200 frames: seconds and megabytes
-    python tools/benchmarks/rigs.py --faults N what is named in N rigs with each fault, and in N healthy ones
+    python tools/benchmarks/rigs.py --faults N what is named in N rigs with each fault, and in N healthy ones; with a
+                                               WORD behind it, of the faults and healthy ones whose names have it
 
 "within 3 ±" and "95 % intervals" (1.96 ±) count the six numbers of every two cameras' relative pose; behind the stroke
 are the intervals by the noise of corners alone. A board that bends does so otherwise in every frame, by 0.5 px in each
@@ -199,13 +200,14 @@ def large() -> None:
     print(f"8 cameras, {len(truth.world_from_board)} frames, {views} views: {seconds:.1f} s, {peak:.0f} MB")
 
 
-def faults(count: int) -> None:
+def faults(count: int, word: str = "") -> None:
     """How often each fault is named, and alone, and how often anything is in healthy rigs."""
     every = [each for each in vars(checks).values() if isinstance(each, Fault)]
     print(table(["rigs", "named", "others named", "refused"], []), end="")
     kinds = [(each.name, each.finding, partial(each.inject, strength=each.promised)) for each in every]
     for kind in (*kinds, ("healthy rigs", "", healthy), ("healthy films", "", healthy_film)):
-        print(f"| {' | '.join(fault_row(*kind, count))} |", flush=True)
+        if word in kind[0]:
+            print(f"| {' | '.join(fault_row(*kind, count))} |", flush=True)
 
 
 def healthy(rng: np.random.Generator) -> Evidence:
@@ -242,7 +244,7 @@ def found_by(kind: Kind, evidence: Evidence) -> list[Finding]:
 def main() -> None:
     words = sys.argv[1:]
     if "--faults" in words:
-        faults(int(words[1]) if words[1:] else 50)
+        faults(int(words[1]) if words[1:] else 50, "".join(words[2:3]))
         return
     if "--large" in words:
         large()

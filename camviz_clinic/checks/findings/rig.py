@@ -20,7 +20,7 @@ from camviz_clinic.rigs.series import by_themselves, delays, frame_numbers, jump
 from camviz_clinic.rigs.virtual import VirtualRig
 
 FEWEST_CORNERS = 4
-ONE_AXIS_DEG = 4.0  # RMS of the turns about the other axes
+ONE_AXIS_DEG = 2.5  # RMS of the turns about the other axes
 TURNED_DEG = 8.0  # RMS about the one: boards that turn less are another matter
 FEWEST_FRAMES = 6
 APART = 3.0  # pixels between the two cameras' numbers, or they cannot be told apart
@@ -157,7 +157,7 @@ def _solved(truth: VirtualRig, rng: Rng) -> Evidence:
     symptom="A rig's board was turned about one axis only.",
     causes=("a board on a turntable, or carried on its stand",),
     remedy="Add frames with the board tilted to all sides by 20° to 40°.",
-    threshold="All turns but those about one axis are below 4° RMS, and those about it above 8°.",
+    threshold="All turns but those about one axis are below 2.5° RMS, and those about it above 8°.",
     asked_of=_a_rig,
 )
 def rig_one_axis(evidence: Evidence) -> Iterator[Finding]:
@@ -174,7 +174,7 @@ def rig_one_axis(evidence: Evidence) -> Iterator[Finding]:
     if spread[1] < ONE_AXIS_DEG and spread[2] > TURNED_DEG:
         sentence = (
             f"The board was turned about one axis, by {spread[2]:.0f}° RMS, and about all others by {spread[1]:.1f}°: "
-            "what a lens and a camera's place have in common along that axis, these frames do not tell apart."
+            "no frame shows how the cameras see a board that is tilted to its other sides."
         )
         yield rig_one_axis.found(sentence, spread[1], "°")
 
