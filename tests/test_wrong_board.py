@@ -62,7 +62,9 @@ def test_mirrored_pictures_are_named_as_such(kind, taken, tmp_path):
     paths = [tmp_path / path.name for path in taken(kind)]
     for path, original in zip(paths, taken(kind), strict=True):
         cv2.imwrite(str(path), cv2.imread(str(original))[:, ::-1])
-    said = "view0.png and view1.png show this board mirrored: turn off the camera's mirroring, or flip them left to right"
+    said = (
+        "view0.png and view1.png show this board mirrored: turn off the camera's mirroring, or flip them left to right"
+    )
     with pytest.raises(CannotCalibrate, match=said):
         detect(paths, SHOWN[kind][0], **QUICK)
 
