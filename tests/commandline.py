@@ -3,7 +3,9 @@
 import os
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 
 import camviz
 from camviz_clinic.commands.command import main
@@ -13,12 +15,16 @@ ROOT = Path(camviz.__file__).parents[1]
 
 def run(*words, **options):
     """The command in a process of its own, as a person runs it."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return python("-m", "camviz", *words, **options)
+
+
+def python(*words, environment=MappingProxyType({}), **options):
+    """A process of Python that finds this repository's packages."""
     return subprocess.run(
-        [sys.executable, "-m", "camviz", *words],
+        [sys.executable, *words],
         capture_output=True,
         text=True,
-        env=environment,
+        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
         timeout=300,
         **options,
     )
@@ -31,15 +37,8 @@ def on_a_full_disk(*words, **options):
     """
     import resource  # Windows has none, and skips what needs this
 
-    return subprocess.run(
-        [sys.executable, *words],
-        capture_output=True,
-        text=True,
-        env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"},
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000)),
-        timeout=300,
-        **options,
-    )
+    limit = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (1000, 1000))
+    return python(*words, environment={"PYTHONDONTWRITEBYTECODE": "1"}, preexec_fn=limit, **options)
 
 
 def refused(capsys, room, *words):

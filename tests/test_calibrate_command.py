@@ -41,18 +41,6 @@ def room(tmp_path, monkeypatch):
     return tmp_path
 
 
-def run(*words, **options):
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    return subprocess.run(
-        [sys.executable, "-m", "camviz", "calibrate", *map(str, words)],
-        capture_output=True,
-        text=True,
-        env=environment,
-        timeout=300,
-        **options,
-    )
-
-
 def test_the_camera_of_a_folder_is_written_and_read_by_camviz_and_by_opencv(room, capsys):
     shots(room / "shots")
     (room / "shots" / "view99.jpg").write_text("no picture")

@@ -19,7 +19,6 @@ from camviz_clinic.calibration.guesses import guesses
 LOOKED_AT = 6  # pictures, spread over all of them
 LARGEST = 1000  # pixels along the longer side of what is looked at
 NAMED = 3
-OF_MARKERS = ("aprilgrid", "charuco", "markers")
 
 Gray = NDArray[np.uint8]
 
@@ -32,12 +31,12 @@ def another_board(paths: Sequence[str | PathLike[str]], names: Sequence[str], bo
     votes: dict[str, list[str]] = {}
     says = {}
     chosen = _spread(len(paths))
-    mirrored = [names[place] for place in chosen if _mirrored(_gray(paths[place]), board)]
+    pictures = {place: gray for place in chosen if (gray := _gray(paths[place])) is not None}
+    mirrored = [names[place] for place, gray in pictures.items() if _mirrored(gray, board)]
     if mirrored and len(mirrored) >= min(2, len(chosen)):
         return f"{_listed(mirrored)} this board mirrored: turn off the camera's mirroring, or flip them left to right"
-    for place in chosen:
-        gray = _gray(paths[place])
-        guess = next(guesses(_smaller(gray)), None) if gray is not None else None
+    for place, gray in pictures.items():
+        guess = next(guesses(_smaller(gray)), None)
         if guess is not None:
             votes.setdefault(guess.options, []).append(names[place])
             says[guess.options] = guess.says
@@ -71,11 +70,10 @@ def part_of_a_larger(
     return f"{_listed([names[place] for place in more])} more squares than a {kind_of(board).says(board)} has{rest}"
 
 
-def _mirrored(gray: Gray | None, board: Shape) -> bool:
+def _mirrored(gray: Gray, board: Shape) -> bool:
     """Whether a picture shows the board flipped left to right; squares and circles look alike then, markers do not."""
-    if gray is None or kind_of(board).name not in OF_MARKERS:
-        return False
-    return find_corners(np.ascontiguousarray(gray[:, ::-1]), board, "classic") is not None
+    has_markers = kind_of(board).partial  # they alone tell which part of a board is seen
+    return has_markers and find_corners(np.ascontiguousarray(gray[:, ::-1]), board, "classic") is not None
 
 
 def _gray(path: str | PathLike[str]) -> Gray | None:

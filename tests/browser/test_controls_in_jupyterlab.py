@@ -1,4 +1,4 @@
-"""The controls under fingers, keys and screen readers in JupyterLab and Notebook 7, and when the kernel is gone."""
+"""Controls under fingers, keys and screen readers, and without a kernel: in JupyterLab, with --all in Notebook 7."""
 
 import json
 import re

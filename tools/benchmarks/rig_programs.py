@@ -48,7 +48,7 @@ def rig_by_opencv(found: Found, board: Board) -> Rig:
     return rig
 
 
-def rig_by_mrcal(found: Found, board: Board, *options: str) -> Rig:
+def rig_by_mrcal(found: Found, board: Board) -> Rig:
     """mrcal-calibrate-cameras as it comes, from OpenCV's focal length, without the region of valid intrinsics.
 
     Where a camera has few views, it fails in the search for this region after it has solved for everything.
@@ -67,8 +67,7 @@ def rig_by_mrcal(found: Found, board: Board, *options: str) -> Rig:
         words += f"--object-height-n {board.rows} --imagersize {' '.join(size)} "
         words += " ".join(f"cam{camera}-frame*.png" for camera in range(len(found)))
         program = ["/usr/bin/python3", "-c", WITHOUT_REGION, str(shutil.which("mrcal-calibrate-cameras"))]
-        command = [*program, *options, *words.split()]
-        subprocess.run(command, cwd=folder, capture_output=True, check=True, timeout=LIMIT_S)
+        subprocess.run([*program, *words.split()], cwd=folder, capture_output=True, check=True, timeout=LIMIT_S)
         files = [Path(folder, f"camera-{camera}.cameramodel") for camera in range(len(found))]
         return {name: next(iter(load(path).cameras.values())) for name, path in zip(found, files, strict=True)}
 

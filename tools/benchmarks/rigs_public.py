@@ -374,7 +374,7 @@ def main(arguments: list[str]) -> None:
             if one.truth:
                 true.append(beside_truth(one, found))
     if lines:
-        head = ["set", "cameras", *PROGRAMS, "against the better one", f"corners beyond {WILD:g} px"]
+        head = ["set", "cameras", *PROGRAMS, "camviz against the best of the others", f"corners beyond {WILD:g} px"]
         print(table(head, lines))
     if films:
         print(table(["film", f"frames below / from {FAST:g} px", *PROGRAMS], films))

@@ -68,8 +68,8 @@ def _mend(pages: dict[Path, str], digest: str) -> None:
 def without_uncoloured(html: str) -> str:
     """The page without the elements around operators and code that has no colour: half of a lesson's elements.
 
-    >>> without_uncoloured('<span class="n">x</span><span class="p">,</span> <span class="mi">1</span>')
-    'x, <span class="mi">1</span>'
+    >>> without_uncoloured('<span class="n">x</span> <span class="o">=</span> <span class="mi">1</span>')
+    'x = <span class="mi">1</span>'
     """
     return _UNCOLOURED.sub(r"\1", html)
 
