@@ -156,11 +156,12 @@ class QuestionWidget(StillWidget):
 
     def _show(self) -> None:
         cards = zip(self.sheet.questions, self.tries, self._earlier, strict=True)
-        self.cards = [_card(one, made, earlier, self.sheet.silent, self._voting) for one, made, earlier in cards]
-        self.can_start_again = any(self.tries) and not self.sheet.silent and not self._voting
-        self.room = self._ballot.news.said if self._ballot else ""
-        self.summary = "" if self.sheet.silent else score(self.sheet.questions, self.tries)
-        self._kept(self._account)
+        with self.hold_sync():  # one message: a reply is never seen without what belongs to it
+            self.cards = [_card(one, made, earlier, self.sheet.silent, self._voting) for one, made, earlier in cards]
+            self.can_start_again = any(self.tries) and not self.sheet.silent and not self._voting
+            self.room = self._ballot.news.said if self._ballot else ""
+            self.summary = "" if self.sheet.silent else score(self.sheet.questions, self.tries)
+            self._kept(self._account)
 
     def _recall(self, book: AnswerBook) -> None:
         """What was chosen before, in another run of the cell or another kernel."""

@@ -77,7 +77,7 @@ def test_before_and_after_by_keyboard_over_a_restart_into_a_file(notebook, folde
     assert [form.locator("input:checked").count() for form in forms] == [1, 1, 0, 0]
     for form in forms[2:]:
         choose(form, 0)
-    assert KEPT_IN in before.locator(".camviz-summary").inner_text()
+    expect(before.locator(".camviz-summary")).to_contain_text(KEPT_IN)
     assert before.locator(".camviz-right, .camviz-wrong").count() == 0
 
     after = quiz_of(notebook, "Exit quiz")
