@@ -192,7 +192,7 @@ def test_the_reply_is_that_of_the_choice_made_and_of_no_other(widget):
 
 def test_a_reply_reaches_the_page_together_with_all_that_belongs_to_it(widget, monkeypatch):
     messages = []
-    monkeypatch.setattr(QuestionWidget, "send_state", lambda _widget, names: messages.append(set(names)))
+    monkeypatch.setattr(QuestionWidget, "send_state", lambda _widget, key: messages.append(set(key)))
     for number, one in enumerate(widget.sheet.questions):
         widget.commit(number, one.answer)
     assert len(messages) == len(widget.sheet.questions)
