@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Set
+from copy import deepcopy
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -28,6 +29,9 @@ PICTURES = "_pictures"
 _ASK = re.compile(r'^ask\("([\w.]+)"\)$')
 _QUIZ = re.compile(r'^quiz\("(\w+)"(?:, "(\w)")?\)$')
 _CODE = '<p class="camviz-code pst-js-only"><button type="button">Show all code</button></p>'
+_IMPORTS = re.compile(r"(?:(?:(?:import|from) .*)?(?:\n|\Z))+")  # at a cell's begin
+_NO_NUMBER = re.compile(r"\bnan(?![a-z])")  # what a function that nobody has written leads to
+_NOT_FETCHED = re.compile(r"The sample (\S+) could not be fetched")
 _HINTS = ("Where to look", "What to use", "The line, with a gap")
 
 
@@ -57,11 +61,12 @@ class LessonPage:
             if cell.cell_type == "markdown":
                 cell.source = self._text(cell)
             elif cell.cell_type == "code":
-                self._output(cell, number)
                 if _is_folded(cell, number in self.panes):
-                    cell.metadata["tags"] = [*cell.metadata.get("tags", []), "hide-input"]
+                    _fold(cell)
+                self._output(cell, number)
         self._exercises(notebook)
         notebook.cells = beside(notebook.cells, lambda cell: "pane" if cell.id in moves else _kind(cell))
+        notebook.cells = [part for cell in notebook.cells for part in _imports_apart(cell)]
         for number, cell in enumerate(notebook.cells):
             cell.id = f"cell-{number}"
         notebook.metadata["lesson"] = self.path.name[:2]
@@ -75,7 +80,8 @@ class LessonPage:
 
     def _output(self, cell: Cell, number: int) -> None:
         asked = asked_by(cell.source)
-        cell.outputs = [kept for output in cell.get("outputs", []) for kept in _said(output)]
+        pictured = _has_picture(cell)
+        cell.outputs = [kept for output in cell.outputs for kept in _said(output, pictured)]
         for output in cell.outputs:
             data = output.get("data", {})
             if "text/html" not in data:
@@ -99,9 +105,36 @@ class LessonPage:
 
 
 def _is_folded(cell: Cell, moves: bool) -> bool:
-    """Whether the code of a cell is seen only when a reader asks for all code: it sets up, asks, checks or shows."""
+    """Whether the code of a cell is seen only when a reader asks for all code.
+
+    It sets up, asks, checks or shows, or it waits for functions that a reader writes in a notebook.
+    """
     tags = set(cell.metadata.get("tags", []))
-    return moves or bool({"setup", "colab", "check"} & tags) or asked_by(cell.source) is not None
+    return moves or bool({"setup", "colab", "check"} & tags) or asked_by(cell.source) is not None or _waits(cell)
+
+
+def _waits(cell: Cell) -> bool:
+    lines = "".join(output.get("text", "") for output in cell.outputs).splitlines()
+    return any(is_unwritten(line) or _NO_NUMBER.search(line) for line in lines)
+
+
+def _fold(cell: Cell) -> None:
+    cell.metadata["tags"] = [*cell.metadata.get("tags", []), "hide-input"]
+
+
+def _imports_apart(cell: Cell) -> list[Cell]:
+    """A cell, or two of one whose code is seen: what it imports, which is folded, and the rest."""
+    found = _IMPORTS.match(cell.source) if cell.cell_type == "code" else None
+    if not found or "hide-input" in cell.metadata.get("tags", []):
+        return [cell]
+    if found.end() == len(cell.source):
+        _fold(cell)
+        return [cell]
+    imports = deepcopy(cell)
+    imports.source, imports.outputs, imports.metadata["tags"] = found[0].strip(), [], ["imports"]
+    _fold(imports)
+    cell.source = cell.source[found.end() :]
+    return [imports, cell]
 
 
 def _has_figure(cell: Cell) -> bool:
@@ -109,16 +142,30 @@ def _has_figure(cell: Cell) -> bool:
     return any("<figure" in output.get("data", {}).get("text/html", "") for output in cell.get("outputs", []))
 
 
-def _said(output: Cell) -> list[Cell]:
-    """An output, in which what a notebook says of unwritten functions is one sentence for who reads a page."""
-    lines = output.text.splitlines(keepends=True) if output.output_type == "stream" else []
-    names = dict.fromkeys(re.findall(r"`\w+`", "".join(filter(is_unwritten, lines))))
-    if not names:
+def _has_picture(cell: Cell) -> bool:
+    return any("<img" in output.get("data", {}).get("text/html", "") for output in cell.outputs)
+
+
+def _said(output: Cell, pictured: bool) -> list[Cell]:
+    """An output, in which what a notebook says of unwritten functions is one sentence for who reads a page.
+
+    A number that such a function would give is a dash, and of a photograph that could not be fetched its name is told.
+    """
+    if output.output_type != "stream":
         return [output]
-    output.text = "".join(line for line in lines if not is_unwritten(line))
-    sentence = f"A part of this picture waits for {' and '.join(names)}, which you write in a notebook."
-    waits = _html_output(f'<p class="camviz-awaited">{prose.inline(sentence)}</p>')
-    return [output, waits] if output.text.strip() else [waits]
+    lines = output.text.splitlines(keepends=True)
+    sentences = []
+    if names := dict.fromkeys(re.findall(r"`\w+`", "".join(filter(is_unwritten, lines)))):
+        what = "A part of this picture" if pictured else "This"
+        sentences.append(f"{what} waits for {' and '.join(names)}, which you write in a notebook.")
+    sentences += [
+        f"The photograph {name} is not on this page; a notebook fetches it."
+        for name in _NOT_FETCHED.findall(output.text)
+    ]
+    kept = (line for line in lines if not is_unwritten(line) and not _NOT_FETCHED.match(line))
+    output.text = _NO_NUMBER.sub("–", "".join(kept))
+    told = [_html_output(f'<p class="camviz-awaited">{prose.inline(one)}</p>') for one in sentences]
+    return [output, *told] if output.text.strip() else told
 
 
 def _kind(cell: Cell) -> Kind:
