@@ -102,7 +102,7 @@ function lastWords(send, cleared) {
   again.addEventListener("click", () => { clearing = true; send({ again: true }); });
   said.setAttribute("role", "status");
   node.append(back, write, again, said);
-  let shown = null, clearing = false;
+  let shown = null, clearing = false, told = "";
   return {
     node,
     show(lookingBack, canExport, canStartAgain, exported) {
@@ -110,10 +110,14 @@ function lastWords(send, cleared) {
       back.querySelectorAll("summary").forEach(keepKeys);
       write.hidden = !canExport;
       again.hidden = !canStartAgain;
-      const words = clearing && !canStartAgain ? "Your answers here are cleared." : exported;
+      if (canStartAgain) told = "";
+      else if (clearing) {
+        told = "Your answers here are cleared.";
+        clearing = false;
+        cleared(); // the button that had the focus is gone
+      }
+      const words = told || exported;
       if (said.textContent !== words) said.textContent = words;
-      if (clearing && !canStartAgain) cleared(); // the button that had the focus is gone
-      if (!canStartAgain) clearing = false;
     },
   };
 }
