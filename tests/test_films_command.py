@@ -1,8 +1,10 @@
 """`camviz calibrate film.mp4`: films and phones' stills in place of pictures, and what is said of them."""
 
+import json
 import sys
 import tempfile
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import cv2
@@ -17,6 +19,7 @@ from camviz.colour.picture_files import PictureError, picture_exif, read_gray
 from camviz.lenses import BrownConrady
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.types import Board
+from camviz_clinic.files import Calibration, write
 from camviz_clinic.films.stills import as_png
 from camviz_clinic.films.virtual import take, write_film
 
@@ -94,6 +97,17 @@ def test_films_of_a_rig_place_its_cameras_by_their_names(films, capsys):
     found = camviz_clinic.load("rig.toml")
     assert list(found.cameras) == ["left", "right"]
     assert found.cameras["right"].centre == pytest.approx([0.08, 0, 0], abs=2e-3)
+
+
+@pytest.mark.parametrize(("longer", "verdicts"), [(1.0, "pass warn inconclusive"), (1.08, "fail")])
+def test_a_calibration_is_checked_by_a_film(films, capsys, longer, verdicts):
+    """The film's own camera is not refused; one with a focal length 8 % longer is."""
+    used = replace(LEFT, intrinsics=replace(LEFT.intrinsics, fx=longer * 200, fy=longer * 200))
+    write(Calibration({"camera": used}, Path("used.yaml"), "opencv", board=BOARD), "used.yaml", "opencv")
+    main(["check", "used.yaml", "left.avi", "--finder", "classic", "--frames", "20", "--json"])
+    said = json.loads(capsys.readouterr().out)
+    assert said["verdict"] in verdicts.split()
+    assert any("left.avi: " in note and " frames were chosen, of " in note for note in said["notes"])
 
 
 def test_what_films_cannot_be_is_refused_in_one_sentence(films, room, capsys):

@@ -108,7 +108,7 @@ def add(commands: Any) -> None:
     )
     add_rig(command)
     add_boards(command)
-    add_frames(command)
+    add_frames(command, "30, with --rolling-shutter 120")
     add_board(command, required=False, default=False)
     add_corners(command)
     add_baseline(command)

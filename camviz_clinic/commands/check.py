@@ -21,13 +21,16 @@ from camviz_clinic.commands.common import (
     pixels,
     size,
 )
+from camviz_clinic.commands.films import as_pictures, take_films_alone
 from camviz_clinic.commands.gate import EPILOG as GATE
 from camviz_clinic.commands.gate import add_gate, given_gate, refuse_junit, write_junit
 from camviz_clinic.commands.pictures import Bar, pictures
 from camviz_clinic.commands.terminal import tell, tell_json
 
 if TYPE_CHECKING:
+    from camviz.cameras import Camera
     from camviz_clinic.calibration import Detections
+    from camviz_clinic.checks.gate import Gate
     from camviz_clinic.files import Board, Calibration
 
 INCONCLUSIVE = 4
@@ -51,7 +54,8 @@ board's poses are free. The verdict is one of
   inconclusive  the pictures do not tell; what would settle it is said
 
 "Off" is how far points far away are displaced over the image (RMS), once a turn of the whole camera is taken out. With
---right the calibration is of a pair: rows, depths and the baseline against the board are judged, too.
+--right the calibration is of a pair: rows, depths and the baseline against the board are judged, too. A film may stand
+for pictures; a pair has one of each camera, and they begin at the same moment.
 
 docs/clinic.md says how the verdict comes about, and how often it is wrong.
 """
@@ -60,6 +64,7 @@ examples:
   camviz check camera.yaml new/*.jpg
   camviz check camera.yml new/ --board 9x6 --square-mm 25 --limit-px 0.5
   camviz check stereo.yaml new/left/ --right new/right/ --json
+  camviz check camera.yaml new.mp4
   camviz check camera.yaml new/ --fail-on fault --limit change-px=0.5 --junit check.xml
 
 {gate}  Here a verdict of fail is as a fault, and warn as a warning; ids of findings do not concern it.
@@ -77,12 +82,15 @@ def add(commands: Any) -> None:
     command = add_command(commands, "check", check, "say whether a calibration still holds", CHECK)
     command.epilog = EPILOG.format(gate=GATE)
     command.add_argument("calibration", metavar="CALIBRATION", type=Path, help="the calibration in use (- is stdin)")
-    command.add_argument("images", metavar="IMAGES", nargs="+", help="new pictures, folders of them, or patterns")
+    command.add_argument(
+        "images", metavar="IMAGES", nargs="+", help="new pictures, folders of them, patterns, or a film"
+    )
     command.add_argument("--right", metavar="IMAGES", nargs="+", help="those of the right camera; IMAGES is the left")
     command.add_argument("--camera", metavar="NAME", help="the camera that took IMAGES, where CALIBRATION has several")
     add_board(command, required=False, default=False)
     command.add_argument("--finder", choices=FINDERS, default="auto", help="how chessboards are found")
     add_seconds(command)
+    take_films_alone(command)
     command.add_argument("--limit-px", metavar="PX", type=pixels, help="how far it may be off (default: 1)")
     command.add_argument("--size", metavar="WxH", type=size, help="image size, where CALIBRATION does not hold it")
     command.add_argument("--json", action="store_true", help="the same for programs")
@@ -93,13 +101,6 @@ def add(commands: Any) -> None:
 
 def check(options: argparse.Namespace) -> int:
     """Find the board, judge, and say the verdict."""
-    from camviz_clinic.calibration import CannotCalibrate
-    from camviz_clinic.calibration.stamp import Stamp
-    from camviz_clinic.checks import check as judge
-    from camviz_clinic.checks.deployed import LIMIT_PX
-    from camviz_clinic.checks.gate import CHANGE
-    from camviz_clinic.files.output import json_text
-
     gate = given_gate(options)
     refuse_junit(options, options.calibration, *map(Path, [*options.images, *(options.right or [])]))
     calibration = loaded(options.calibration, options.size)
@@ -110,6 +111,34 @@ def check(options: argparse.Namespace) -> int:
             "as --board 9x6 --square-mm 25."
         )
     names = _cameras(calibration, options)
+    with as_pictures(options, _how_chosen(calibration.cameras[names[0]], board, options)) as of_films:
+        return _judged(calibration, names, board, options, gate, of_films)
+
+
+def _how_chosen(camera: Camera, board: Board, options: argparse.Namespace) -> dict[str, Any]:
+    """By which model, and of which board, a film's frames are chosen."""
+    from camviz.lenses import KannalaBrandt
+
+    model = "fisheye" if isinstance(camera.lens, KannalaBrandt) else "standard"
+    return {"board": board, "model": model, "search": {"finder": options.finder, "seconds": options.seconds}}
+
+
+def _judged(
+    calibration: Calibration,
+    names: tuple[str, ...],
+    board: Board,
+    options: argparse.Namespace,
+    gate: Gate,
+    of_films: tuple[str, ...],
+) -> int:
+    """Find the board, judge, and say the verdict, and before it what is to be said of films."""
+    from camviz_clinic.calibration import CannotCalibrate
+    from camviz_clinic.calibration.stamp import Stamp
+    from camviz_clinic.checks import check as judge
+    from camviz_clinic.checks.deployed import LIMIT_PX
+    from camviz_clinic.checks.gate import CHANGE
+    from camviz_clinic.files.output import json_text
+
     try:
         with Bar() as bar:
             found = _found(names, board, options, bar)
@@ -118,7 +147,8 @@ def check(options: argparse.Namespace) -> int:
     limit = options.limit_px or gate.limits.get(CHANGE, LIMIT_PX)
     words = dict(zip(names, (options.images, options.right), strict=False))
     taken = {name: Stamp.of(pictures(words[name])) for name in names}
-    audit = gate.audit(judge(calibration, found, board, limit, taken))
+    said = judge(calibration, found, board, limit, taken)
+    audit = gate.audit(replace(said, notes=(*of_films, *said.notes)))
     if options.json:
         tell_json(json_text(audit.as_tree()))
     else:

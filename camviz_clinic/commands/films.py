@@ -14,7 +14,7 @@ from camviz_clinic.commands.boards import board_of
 from camviz_clinic.commands.common import LACKING, Refusal, refuse_output
 from camviz_clinic.commands.pictures import PICTURES, Bar, pictures
 from camviz_clinic.commands.rig import held_of, models_of, told_apart
-from camviz_clinic.commands.rolling import film_in_bursts, is_rolling, refuse_no_film
+from camviz_clinic.commands.rolling import OFF, film_in_bursts, is_rolling, refuse_no_film
 from camviz_clinic.commands.several import read_boards
 
 if TYPE_CHECKING:
@@ -31,13 +31,19 @@ turned as a phone would show them: the camera is that of the sensor's own rows a
 """
 
 
-def add_frames(command: argparse.ArgumentParser) -> None:
+def add_frames(command: argparse.ArgumentParser, default: str = "30") -> None:
     command.add_argument(
         "--frames",
         metavar="N",
         type=_frames,
-        help="how many frames of films are used, for each camera (default: 30, with --rolling-shutter 120)",
+        help=f"how many frames of films are used, for each camera (default: {default})",
     )
+
+
+def take_films_alone(command: argparse.ArgumentParser) -> None:
+    """A command with IMAGES and --right takes films in their place, and nothing else that `camviz calibrate` takes."""
+    add_frames(command)
+    command.set_defaults(corners=None, rig=None, rolling_shutter=OFF, output=None, report=None)
 
 
 def _frames(text: str) -> int:
@@ -50,7 +56,8 @@ def _frames(text: str) -> int:
 def as_pictures(options: argparse.Namespace, how: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
     """The options name pictures where they named films and HEIC stills; what is to be said of these, in sentences.
 
-    `how` is what `chosen_frames` is told of the model and the search. Raises Refusal for films that cannot be used.
+    `how` is what `chosen_frames` is told of the model and the search, and of the board where no option names it.
+    Raises Refusal for films that cannot be used.
     """
     if options.corners:
         if is_rolling(options):
@@ -137,11 +144,13 @@ def _chosen(
     from camviz_clinic.films.taking import FRAMES
 
     boards = read_boards(options.boards) if getattr(options, "boards", None) else None
-    board, frames = board_of(options) if not boards else boards.boards, options.frames or FRAMES
+    frames = options.frames or FRAMES
+    if "board" not in how:
+        how = {"board": boards.boards if boards else board_of(options), **how}
     fixture = {"apart": boards.apart, "known": boards.known} if boards else None
     with Bar("frames read") as reading, Bar("frames looked at") as looking:
         try:
-            return chosen_frames(takes, room, board, frames, fixture=fixture, reading=reading, looking=looking, **how)
+            return chosen_frames(takes, room, frames=frames, fixture=fixture, reading=reading, looking=looking, **how)
         except (FilmError, PictureError) as error:
             raise Refusal(f"{error}.") from error
         except ValueError as error:  # a parameter to fix that the model does not have
