@@ -46,7 +46,6 @@ OF_MRCAL = 8  # of the halves; it takes seconds to start
 VIRTUAL, SOME = 100, 12
 ENOUGH = 20
 SMALL = ("opencv-left", "opencv-right")
-MODELS = {"fisheye": ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4")}
 STANDARD = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 SEED = 50_000
 
@@ -147,12 +146,12 @@ def _only(views: Detections, mask: np.ndarray) -> Detections:
 
 
 def cell(ratios: list[np.ndarray]) -> str:
-    """ "1.02: 68, 95 %" of the ratios: RMS, and how many are within 1 and within 1.96."""
+    """ "1.02: 68, 95 %" of the ratios: RMS of those that are numbers, and how many of all are within 1 and 1.96."""
     if not ratios:
         return "–"
     z = np.concatenate(ratios)
     within = [f"{100 * np.mean(np.abs(z) < limit):.0f}" for limit in (1, 1.96)]
-    return f"{np.sqrt(np.mean(z**2)):.2f}: {', '.join(within)} %"
+    return f"{np.sqrt(np.nanmean(z**2)):.2f}: {', '.join(within)} %"
 
 
 def pictures(names: set[str], count: int) -> Iterator[list[str]]:
@@ -163,7 +162,7 @@ def pictures(names: set[str], count: int) -> Iterator[list[str]]:
         views, board = one.found()
         if len(views.corners) < ENOUGH and one.name not in SMALL:
             continue
-        model = one.models[-1] if "fisheye" in one.models else one.models[0]
+        model = "fisheye" if "fisheye" in one.models else one.models[0]
         ratios = halved(views, board, model, count)
         lines = [one.name, str(len(views.corners)), model, *(cell(ratios[name]) for name in COLUMNS)]
         print(" | ".join(lines), file=sys.stderr, flush=True)
