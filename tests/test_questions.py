@@ -2,6 +2,7 @@
 
 import json
 import re
+from unittest.mock import Mock
 
 import pytest
 
@@ -190,13 +191,13 @@ def test_the_reply_is_that_of_the_choice_made_and_of_no_other(widget):
     assert all(other["reply"] == "" for other in widget.cards[1:])
 
 
-def test_a_reply_reaches_the_page_together_with_all_that_belongs_to_it(widget, monkeypatch):
-    messages = []
-    monkeypatch.setattr(QuestionWidget, "send_state", lambda _widget, key: messages.append(set(key)))
+def test_a_reply_reaches_the_page_together_with_all_that_belongs_to_it(widget):
+    widget.comm = page = Mock(comm_id="page")
     for number, one in enumerate(widget.sheet.questions):
         widget.commit(number, one.answer)
-    assert len(messages) == len(widget.sheet.questions)
-    assert {"cards", "summary"} <= messages[-1]
+    told = [call.kwargs["data"]["state"].keys() for call in page.send.call_args_list]
+    assert len(told) == len(widget.sheet.questions)
+    assert {"cards", "summary"} <= told[-1]
 
 
 def test_a_quiz_counts_first_tries_only_and_waits_for_all_of_them(widget):
