@@ -29,9 +29,9 @@ PICTURES = "_pictures"
 _ASK = re.compile(r'^ask\("([\w.]+)"\)$')
 _QUIZ = re.compile(r'^quiz\("(\w+)"(?:, "(\w)")?\)$')
 _CODE = '<p class="camviz-code pst-js-only"><button type="button">Show all code</button></p>'
-_IMPORTS = re.compile(r"(?:(?:(?:import|from) .*)?(?:\n|\Z))+")  # at a cell's begin
-_NO_NUMBER = re.compile(r"\bnan(?![a-z])")  # what a function that nobody has written leads to
-_NOT_FETCHED = re.compile(r"The sample (\S+) could not be fetched")
+_IMPORTS = re.compile(r"(?:(?:(?:import|from) [^(\n]*)?(?:\n|\Z))+")  # at a cell's begin
+_NO_NUMBER = re.compile(r"\bnan\b")  # what a function that nobody has written leads to
+_NOT_FETCHED = re.compile(r"^The sample (\S+) could not be fetched", re.MULTILINE)
 _HINTS = ("Where to look", "What to use", "The line, with a gap")
 
 
