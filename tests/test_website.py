@@ -19,24 +19,24 @@ import psutil
 import pytest
 from docutils import nodes
 from docutils.core import publish_doctree
-from PIL import Image
 from pygments.formatters import HtmlFormatter
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "tools/website"))
+sys.path[:0] = [str(ROOT / "tools/website"), str(ROOT / "tools/docs")]
 
-import clips  # noqa: E402
 import docstrings  # noqa: E402
 import engineers  # noqa: E402
 import mistakes  # noqa: E402
 import panes  # noqa: E402
 import pictures  # noqa: E402
+import previews  # noqa: E402
 import slim_styles  # noqa: E402
 from api_pages import aliases, api_pages  # noqa: E402
 from beside import beside  # noqa: E402
 from course_pages import course_pages, learn  # noqa: E402
 from lesson_page import LessonPage, asked_by, exercise_html  # noqa: E402
 from links import on_site  # noqa: E402
+from moving_picture import moved  # noqa: E402
 from scripts import question_script  # noqa: E402
 
 from camviz.cameras import Camera  # noqa: E402
@@ -296,16 +296,20 @@ def test_a_constant_is_explained_by_its_own_words_and_not_by_its_types():
 
 
 def test_a_preview_tells_its_size(tmp_path: Path):
-    Image.new("RGB", (12, 7)).save(tmp_path / "05.png")
-    assert clips.previews(tmp_path) == {"05": (12, 7)}
+    view = FrustumView(panels="picture")
+    previews.write(view.figure(), "05", tmp_path)
+    width, height = previews.sizes(tmp_path)["05"]
+    assert width == previews.WIDTH
+    assert height / width == pytest.approx(view.figure().height / view.figure().width, abs=0.001)
 
 
-def test_a_clip_begins_at_the_present_state_and_goes_to_both_ends(monkeypatch):
-    monkeypatch.setattr(clips, "_drawn", lambda view, values: values["hfov_deg"])
-    explorer = explore(FrustumView(hfov_deg=60), hfov_deg=(20, 120))
-    way = clips.moved(explorer)
-    assert (way[0], max(way), min(way)) == (60, 120, 20)
-    assert {abs(after - before) for before, after in pairwise([*way, way[0]])} == {5}
+def test_a_moving_picture_begins_at_the_present_state_and_goes_to_both_ends(monkeypatch):
+    monkeypatch.setattr(FrustumView, "figure", lambda view: view.hfov_deg)
+    view, slider = FrustumView(hfov_deg=60), FrustumView.controls()["hfov_deg"]
+    way = moved(view, "hfov_deg")
+    assert (way[0], max(way), min(way)) == (60, slider.high, slider.low)
+    steps = [max(after, before) / min(after, before) for before, after in pairwise([*way, way[0]])]
+    assert max(steps) < 1.1  # no leap, nor from the last picture to the first
 
 
 def fields(lines: list[str]) -> dict[str, str]:

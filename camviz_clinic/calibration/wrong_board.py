@@ -13,6 +13,7 @@ from camviz.colour.picture_files import PictureError, read_gray
 from camviz.lenses.base import Array
 from camviz_clinic.calibration.boards import Shape, kind_of
 from camviz_clinic.calibration.chessboards import goes_on
+from camviz_clinic.calibration.enumeration import enumerated
 from camviz_clinic.calibration.finding import find_corners
 from camviz_clinic.calibration.guesses import guesses
 
@@ -34,7 +35,7 @@ def another_board(paths: Sequence[str | PathLike[str]], names: Sequence[str], bo
     pictures = {place: gray for place in chosen if (gray := _gray(paths[place])) is not None}
     mirrored = [names[place] for place, gray in pictures.items() if _mirrored(gray, board)]
     if mirrored and len(mirrored) >= min(2, len(chosen)):
-        return f"{_listed(mirrored)} this board mirrored: turn off the camera's mirroring, or flip them left to right"
+        return f"{_show(mirrored)} this board mirrored: turn off the camera's mirroring, or flip them left to right"
     for place, gray in pictures.items():
         guess = next(guesses(_smaller(gray)), None)
         if guess is not None:
@@ -45,7 +46,7 @@ def another_board(paths: Sequence[str | PathLike[str]], names: Sequence[str], bo
     options, seen = max(votes.items(), key=lambda each: len(each[1]))
     if len(seen) < min(2, len(chosen)):
         return ""
-    return f"{_listed(seen)} what looks like {says[options]}: try {options}"
+    return f"{_show(seen)} what looks like {says[options]}: try {options}"
 
 
 def part_of_a_larger(
@@ -67,7 +68,7 @@ def part_of_a_larger(
         return ""
     seen = another_board([paths[place] for place in more], [names[place] for place in more], board)
     rest = f": {seen}" if seen else ": count all corners where four squares meet"
-    return f"{_listed([names[place] for place in more])} more squares than a {kind_of(board).says(board)} has{rest}"
+    return f"{_show([names[place] for place in more])} more squares than a {kind_of(board).says(board)} has{rest}"
 
 
 def _mirrored(gray: Gray, board: Shape) -> bool:
@@ -94,10 +95,6 @@ def _spread(count: int) -> list[int]:
     return sorted(set(np.linspace(0, count - 1, min(count, LOOKED_AT)).round().astype(int).tolist()))
 
 
-def _listed(names: Sequence[str]) -> str:
+def _show(names: Sequence[str]) -> str:
     """ "a.png and b.png show", "a.png shows", with at most three names."""
-    if len(names) == 1:
-        return f"{names[0]} shows"
-    if len(names) > NAMED:
-        return f"{', '.join(names[:NAMED])} and {len(names) - NAMED} more show"
-    return f"{', '.join(names[:-1])} and {names[-1]} show"
+    return f"{enumerated(names, most=NAMED)} {'shows' if len(names) == 1 else 'show'}"

@@ -9,10 +9,11 @@ import numpy as np
 
 from camviz.lenses.base import Array
 from camviz_clinic.calibration.detection import Detections
+from camviz_clinic.calibration.enumeration import enumerated
 from camviz_clinic.calibration.problem import LEAST_CORNERS
 from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.checks.gaps import gaps
-from camviz_clinic.checks.judgement import FEWEST_VIEWS, Judgement, listed, px, rated
+from camviz_clinic.checks.judgement import FEWEST_VIEWS, Judgement, px, rated
 from camviz_clinic.checks.refit import Refit, far_columns, reach
 from camviz_clinic.checks.stamps import SizeChange, size_change
 
@@ -97,7 +98,7 @@ def _judged(refit: Refit, limit: float, names: tuple[str, ...], covariance: Arra
         reason = f"{off}, surely by more than {px(least)}, which is half of the {px(limit)} allowed, or more"
         return "warn", reason, _more(refit, limit)
     if missing:
-        parts = listed(missing)
+        parts = enumerated(missing)
         more = f" In all, {_more(refit, limit)}" if verdict == "inconclusive" else ""
         return "inconclusive", f"there are too few corners in {parts}", f"views with corners in {parts}.{more}"
     if verdict == "inconclusive":
@@ -133,7 +134,9 @@ def _facts(refit: Refit) -> tuple[str, ...]:
         f"F = {refit.F:.3g}, which independent noise does {refit.chance:.1g} of the time.",
     ]
     if refit.undecided:
-        facts.append(f"the new views do not decide {listed(refit.undecided)}: boards tilted to different sides would.")
+        facts.append(
+            f"the new views do not decide {enumerated(refit.undecided)}: boards tilted to different sides would."
+        )
     if refit.scatter > 2:
         facts.append(
             f"the views differ {refit.scatter:.2g} times as much as their noise explains, in variance: a board that "

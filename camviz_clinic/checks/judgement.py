@@ -125,8 +125,3 @@ def rated(least: float, most: float, limit: float) -> str:
 def px(length: float) -> str:
     """ "0.12 px", "1.25 px", "110 px"."""
     return f"{length:.0f} px" if length >= 100 else f"{length:.3g} px" if length >= 1 else f"{length:.2g} px"
-
-
-def listed(names: tuple[str, ...]) -> str:
-    """ "a, b and c"."""
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from camviz_clinic.calibration.enumeration import enumerated
 from camviz_clinic.calibration.stamp import FAR, Stamp
 from camviz_clinic.calibration.types import Calibration
 
@@ -92,8 +93,8 @@ def contradictions(calibrated: Stamp, new: Stamp) -> Iterator[Contradiction]:
         ("lens", calibrated.lenses, new.lenses),
     ):
         if ours and (other := [each for each in theirs if each not in ours]):
-            sentence = f"they were taken with another {what}, {_listed(other)}; the calibration is of {_listed(ours)}"
-            yield Contradiction(what, sentence)
+            here, there = (enumerated(each, most=2) for each in (ours, other))
+            yield Contradiction(what, f"they were taken with another {what}, {there}; the calibration is of {here}")
     yield from _other_focal_length(calibrated, new)
     yield from _other_focus(calibrated, new)
     if beyond := _beyond(calibrated.digital_zooms, new.digital_zooms, SAME_FOCAL_LENGTH):
@@ -140,7 +141,7 @@ def settings_differ(stamp: Stamp) -> tuple[str, ...]:
     """What changed among the pictures of one calibration, which one camera model cannot describe; in sentences."""
     said = []
     if len(stamp.cameras) > 1:
-        said.append(f"The pictures were taken with {len(stamp.cameras)} cameras, {_listed(stamp.cameras)}.")
+        said.append(f"The pictures were taken with {len(stamp.cameras)} cameras, {enumerated(stamp.cameras, most=2)}.")
     if (lengths := stamp.focal_lengths) and lengths[-1] / lengths[0] - 1 > SAME_FOCAL_LENGTH:
         said.append(f"The zoom moved between the pictures, from {lengths[0]:g} to {lengths[-1]:g} mm (EXIF).")
     return tuple(said)
@@ -173,7 +174,3 @@ def _range(values: tuple[float, ...], shown: Callable[[float], str]) -> str:
 
 def _metres(distance: float) -> str:
     return "infinity" if distance >= FAR else f"{distance:g} m"
-
-
-def _listed(words: tuple[str, ...] | list[str]) -> str:
-    return " and ".join(words[:2]) + f" and {len(words) - 2} more" * (len(words) > 2)

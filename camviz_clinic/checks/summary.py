@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from camviz_clinic.calibration.detection import seen
+from camviz_clinic.calibration.enumeration import enumerated
 from camviz_clinic.calibration.guidance import instruction, next_board_poses
 from camviz_clinic.calibration.types import Calibration
 from camviz_clinic.calibration.uncertainty import largest_expected_error, projection_uncertainty
 from camviz_clinic.checks.evidence import Evidence
-from camviz_clinic.checks.judgement import listed
 from camviz_clinic.checks.stamps import holds_for
 from camviz_clinic.checks.task import TaskError, task_errors
 
@@ -164,7 +164,7 @@ class Summary:
     @property
     def withheld(self) -> tuple[str, ...]:
         """Why a ± is not told, in a sentence for every camera that lacks one."""
-        lacking = {name: listed(self.undecided(name)) for name in self.names if self.undecided(name)}
+        lacking = {name: enumerated(self.undecided(name)) for name in self.names if self.undecided(name)}
         return tuple(
             f"{name}: the ± of {keys} is not known, because the corners do not decide "
             f"{'them' if ' ' in keys else 'it'} (unidentifiable)."

@@ -13,6 +13,7 @@ from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.arrowhead import inverse
+from camviz_clinic.calibration.enumeration import enumerated
 from camviz_clinic.calibration.types import Mask
 
 Indices = NDArray[np.intp]
@@ -72,7 +73,7 @@ def parted(groups: Sequence[tuple[str, ...]], order: Sequence[str]) -> str:
     >>> parted([("cam0", "cam1"), ("cam2",)], ["cam0", "cam1", "cam2"])
     'cam0 and cam1 never see the board in one frame with cam2: show it to cam1 and cam2 together'
     """
-    names = [listed(group) for group in groups]
+    names = [enumerated(group) for group in groups]
     place = {name: number for number, name in enumerate(order)}
     bridges = []
     for group in groups[1:]:
@@ -141,11 +142,6 @@ def adjoint(pose: RigidTransform) -> Array:
 def cross(vectors: Array) -> Array:
     """[t]ₓ of vectors (…, 3), (…, 3, 3)."""
     return np.asarray(np.swapaxes(np.cross(vectors[..., None, :], np.eye(3)), -1, -2), dtype=float)
-
-
-def listed(names: Sequence[str]) -> str:
-    """ "a, b and c"."""
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _link(first: Adjustment, second: Adjustment, one: str, other: str, frames: Indices) -> Link:

@@ -16,10 +16,11 @@ import numpy as np
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.detection import CannotCalibrate
+from camviz_clinic.calibration.enumeration import enumerated
 from camviz_clinic.calibration.motions import Motions
 from camviz_clinic.calibration.motions_solving import start
 from camviz_clinic.calibration.types import Mask
-from camviz_clinic.rigs.graph import listed, middlemost, parted
+from camviz_clinic.rigs.graph import middlemost, parted
 
 FEWEST_MOTIONS = 6  # frames
 ONE_AXIS_DEG = 3.0  # RMS of the turns about the second axis: with less, a place along the first is unknown
@@ -190,7 +191,7 @@ def _refuse_parted(groups: _Groups, cameras: Sequence[str], boards: Sequence[str
     if len(apart) > 1:
         raise CannotCalibrate(parted(apart, cameras))
     for one, other in _pairs(groups.boards, groups.fixed):
-        here, there = (listed([name for name in boards if name in groups.boards[each]]) for each in (one, other))
+        here, there = (enumerated([name for name in boards if name in groups.boards[each]]) for each in (one, other))
         raise CannotCalibrate(
             f"nothing ties {there} to {here}: show a board of either in one frame, to cameras of the rig"
         )

@@ -224,7 +224,7 @@ class _Recorder:
         """The recording with that share of the positions; None where it breaks the budget, which `_says` why."""
         sheets = self._sheets(share)
         states = self._states(sheets)
-        for key, values in states.items():
+        for key, values in self._in_turn(states):
             if key not in self._drawn:
                 self._drawn[key] = self._frame(values)
         pack, content, images = self._packed(sheets)
@@ -272,6 +272,17 @@ class _Recorder:
         for sheet in sheets:
             states |= {self._key(values): {**first, **values} for values in sheet.states()}
         return states
+
+    def _in_turn(self, states: dict[tuple[Any, ...], Values]) -> Iterator[tuple[tuple[Any, ...], Values]]:
+        """The states, those that differ only in what is recorded with each (an opened panel) one after the other.
+
+        What such a view has measured or traced is still there for the next.
+        """
+        alike: dict[tuple[Any, ...], list[tuple[Any, ...]]] = {}
+        for key in states:
+            rest = tuple(value for axis, value in zip(self._pane.axes, key, strict=True) if not axis.with_each)
+            alike.setdefault(rest, []).append(key)
+        return ((key, states[key]) for keys in alike.values() for key in keys)
 
     def _frame(self, values: Values) -> dict[str, Any]:
         """A state's traits, its photographs apart."""

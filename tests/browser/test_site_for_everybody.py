@@ -257,7 +257,7 @@ def test_a_link_to_any_page_shows_a_picture_of_known_size(page: Page, address: s
           .map((one) => [one.getAttribute("property"), one.content]))""")
         picture = told["og:image"]
         assert picture.startswith("https://"), way
-        with Image.open(SITE / "_clips" / picture.rsplit("/", 1)[1]) as image:
+        with Image.open(SITE / "_previews" / picture.rsplit("/", 1)[1]) as image:
             assert image.size == (int(told["og:image:width"]), int(told["og:image:height"])), way
         assert told["og:url"].startswith("https://"), way
         assert told["og:description"], way

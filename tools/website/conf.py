@@ -5,7 +5,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))  # the extensions beside this file
 
-import clips
+import previews
 
 import camviz
 
@@ -53,7 +53,7 @@ html_baseurl = ADDRESS
 html_context = {
     "default_mode": "light",  # without scripts; with them the reader's own setting holds, from the template's script on
     "address": ADDRESS,
-    "previews": clips.previews(ROOT / "build/site" / clips.CLIPS),
+    "previews": previews.sizes(ROOT / "build/site"),
 }
 html_copy_source = False
 html_show_sourcelink = False

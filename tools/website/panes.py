@@ -25,7 +25,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import clips
+import previews
 from mistakes import MOST, Mistake, drawn_with, mistakes, names_in
 
 from camviz_school.record import Budget
@@ -43,7 +43,7 @@ from camviz.views.frustum import FrustumView
 from camviz.widgets import explore
 explore(FrustumView(panels="world picture"), "yaw_deg", "pitch_deg", "hfov_deg")
 """
-RECORDERS = ("panes.py", "mistakes.py", "clips.py")
+RECORDERS = ("panes.py", "mistakes.py", "previews.py")
 PACKAGES = ("camviz", "camviz_clinic", "camviz_school")
 
 
@@ -120,7 +120,7 @@ class Recorder:
 
     def _is_fresh(self, name: str, cells: dict[int, CodeCell]) -> bool:
         kept = self._kept(name)
-        preview = self.folder.parent / clips.CLIPS / f"{name}.png"
+        preview = previews.path_of(name, self.folder.parent)
         there = preview.exists() and all(
             (self.folder / file).exists() for pane in kept.get("panes", {}).values() for file in pane["files"]
         )
@@ -153,7 +153,7 @@ def record_cells(recorder: Recorder, name: str, cells: dict[int, CodeCell]) -> s
     """Run the cells in this process and record each explorer that one shows; a line about what came out."""
     panes: dict[int, dict[str, Any]] = {}
     shown, before = _shown(recorder.root, cells)
-    clips.write([explorer for _, explorer in shown], name, recorder.folder.parent / clips.CLIPS)
+    previews.write(shown[0][1].view.figure(), name, recorder.folder.parent)
     base = f"../{RECORDINGS}/" if name != HOME else f"{RECORDINGS}/"
     for number, explorer in shown:
         if not explorer.controls:

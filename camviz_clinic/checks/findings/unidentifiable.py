@@ -9,11 +9,11 @@ import numpy as np
 
 from camviz.cameras import Camera
 from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.enumeration import enumerated
 from camviz_clinic.calibration.jacobian import PINHOLE
 from camviz_clinic.calibration.types import Calibration
 from camviz_clinic.calibration.undecided import Undecided
 from camviz_clinic.checks.evidence import Evidence
-from camviz_clinic.checks.judgement import listed
 from camviz_clinic.checks.refit import far_columns
 from camviz_clinic.checks.registry import Finding, Rng, finding
 from camviz_clinic.checks.virtual import single, single_in_the_middle
@@ -78,7 +78,7 @@ def _said(found: tuple[Undecided, ...], worst: int, far: float) -> str:
     changes = found[worst].changes
     others = list(dict.fromkeys(key for each in found for key in each.changes if key not in changes))
     amounts = [_amount(key, value) for key, value in list(changes.items())[:MOST_NAMED]]
-    said = f"the corners do not decide {listed(tuple(changes))}{' together' * (len(changes) > 1)}. "
+    said = f"the corners do not decide {enumerated(tuple(changes))}{' together' * (len(changes) > 1)}. "
     said += f"Such a change is {', '.join(amounts)}{', …' * (len(changes) > MOST_NAMED)}. "
     if np.isfinite(found[worst].most):
         said += f"Where the boards follow it, no corner moves by more than {found[worst].most:.2g} px. "
@@ -86,7 +86,7 @@ def _said(found: tuple[Undecided, ...], worst: int, far: float) -> str:
         said += f"Far points would be seen {far:.2g} px elsewhere (RMS over the image)."
     else:
         said += f"The camera sees the same either way: far points stay within {far:.2g} px (RMS over the image)."
-    return said + (f" Nor do the corners decide {listed(tuple(others))}." if others else "")
+    return said + (f" Nor do the corners decide {enumerated(tuple(others))}." if others else "")
 
 
 def _amount(name: str, value: float) -> str:

@@ -239,7 +239,12 @@ class DepthOfFieldView(View):
         }
         tiles = {TILES.get(name, name): cell for name, cell in self._layout.items()}
         parts = {TILES.get(name, name): draw[name]() for name in self._layout}
-        return self.tiled(tiles, parts, {"lens": _photographed(self, draft)})
+        return self.tiled(tiles, parts, {"lens": _photographed(self._photographed_alone, draft)})
+
+    @property
+    def _photographed_alone(self) -> Self:
+        """The view as far as its photograph depends on it: another panel has nothing traced anew."""
+        return replace(self, panels="photograph", hold="f-number", diffraction=True, bounds=True)
 
     @cached_property
     def _layout(self) -> dict[str, Cell]:
@@ -368,7 +373,7 @@ class DepthOfFieldView(View):
         return self._moved("focus_m", self.focus_m * 1.05 ** (-step if handle == "sensor" else step))
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=128)  # some 2 MB
 def _photographed(view: DepthOfFieldView, rough: bool) -> bytes:
     """The view's photograph as JPEG, which no reader's function changes."""
     return jpeg(view.image(rough=rough))
