@@ -20,6 +20,7 @@ METHODS = ("SGM", "BM", "SGM + WLS")
 """
 _UNIQUE = 5  # per cent by which the best match must beat the second best
 _SPECKLE = (100, 2)  # patches of fewer pixels, of disparities that differ by no more than this, are taken out
+_CHECKED = 21  # pixels of a block; of larger ones OpenCV 5.0.0 checks left against right by memory that nobody has set
 _SMOOTHNESS, _EDGES = 800.0, 1.0  # of the filter: λ, and the grey levels over 255 that count as an edge, times 100
 
 
@@ -35,7 +36,8 @@ def disparity(
 
     d is sought from 0 to `disparities` − 1, so that the first `disparities` columns have none. "BM" is block matching
     by the sum of absolute differences (Konolige); "SGM" semi-global matching (Hirschmüller); "SGM + WLS" the same in
-    both directions, filtered along the left picture's edges by weighted least squares (Min), which fills holes.
+    both directions, filtered along the left picture's edges by weighted least squares (Min), which fills holes. What
+    only one camera sees is left out, but of "BM" with blocks of more than 21 pixels.
 
     Args:
         left, right: (height, width) or (height, width, 3), a rectified pair, grey or sRGB, uint8.
@@ -162,7 +164,10 @@ def left_right_check(disparity_left: ArrayLike, disparity_right: ArrayLike, tole
 
 
 def _block_matching(left: Any, right: Any, disparities: int, block_size: int, picture: Any) -> NDArray[np.int16]:
-    return _strict(cv2.StereoBM.create(numDisparities=disparities, blockSize=block_size)).compute(left, right)
+    matcher = _strict(cv2.StereoBM.create(numDisparities=disparities, blockSize=block_size))
+    if block_size > _CHECKED:
+        matcher.setDisp12MaxDiff(-1)
+    return matcher.compute(left, right)
 
 
 def _semi_global(left: Any, right: Any, disparities: int, block_size: int, picture: Any) -> NDArray[np.int16]:

@@ -146,6 +146,8 @@ class View:
     def with_panels(self, opened: Mapping[str, bool]) -> Self:
         """The view with panels opened (True) or closed (False), by their names; those opened come last.
 
+        What the view has worked out stays, so that a panel opens at once.
+
         Raises ValueError for a panel that is not openable.
         """
         for name in opened:
@@ -153,7 +155,16 @@ class View:
         now = self._panels.split()
         kept = [name for name in now if opened.get(name, True)]
         kept += [name for name, wanted in opened.items() if wanted and name not in now]
-        return self if kept == now else self.but(panels=" ".join(kept))
+        if kept == now:
+            return self
+        changed = self.but(panels=" ".join(kept))
+        vars(changed).update({name: vars(self)[name] for name in self._worked_out if not name.startswith("_")})
+        return changed
+
+    @property
+    def _worked_out(self) -> list[str]:
+        """The cached properties that have a value; only private ones may depend on which panels are drawn."""
+        return [name for name in vars(self) if isinstance(getattr(type(self), name, None), cached_property)]
 
     def but(self, **changes: Any) -> Self:
         """The same view with some fields changed."""
@@ -161,7 +172,7 @@ class View:
 
     def forget(self) -> None:
         """Free what this view has worked out (its cached properties), until it is asked for it again."""
-        for name in [n for n in vars(self) if isinstance(getattr(type(self), n, None), cached_property)]:
+        for name in self._worked_out:
             del vars(self)[name]
 
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:

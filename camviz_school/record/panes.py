@@ -140,6 +140,8 @@ class Explored:
         if unknown := set(together) - set(shown):
             raise ValueError(f"together must name controls that are shown, {', '.join(shown)}, got {unknown.pop()!r}")
         self._explorer, self._first = explorer, explorer.first
+        self._moved: Values = {}  # what is moved in the view drawn last, which has no panel opened
+        self._closed: View = explorer.first
         self.title, self.together = explorer.first.title, together or explorer.together
 
     @property
@@ -175,17 +177,23 @@ class Explored:
         except Exception as problem:  # as at the widget's own edge: whatever a view raises is told to the reader
             view, picture, error = self._first, self._picture, self._explorer.in_words(problem)
         shown = {control["name"]: getattr(view, control["name"]) for control in self._explorer.controls}
-        view.forget()
         frame = {**_frame(picture), "answers": 0, "draft": False, "error": error}
         return {"values": shown, "opened": list(view.opened), "frame": frame}
 
     def _view(self, values: Values) -> View:
-        """The view at a position."""
+        """The view at a position. What it has worked out stays as long as only panels are opened and closed."""
         moved = {axis.name: values[axis.name] for axis in self.axes if values[axis.name] != axis.first}
-        first = self._first.with_panels({moved.pop(PANEL): True}) if PANEL in moved else self._first
-        if EYE in moved:
-            moved[EYE] = replace(self._first.eye, yaw_deg=(moved[EYE] + 180) % 360 - 180)  # type: ignore[attr-defined]
-        return first.but(**moved) if moved else first
+        panel = moved.pop(PANEL, "")
+        if moved != self._moved:
+            self._closed.forget()
+            self._moved, self._closed = moved, self._first.but(**self._as_fields(moved)) if moved else self._first
+        return self._closed.with_panels({panel: True}) if panel else self._closed
+
+    def _as_fields(self, moved: Mapping[str, Any]) -> dict[str, Any]:
+        if EYE not in moved:
+            return dict(moved)
+        eye = replace(self._first.eye, yaw_deg=(moved[EYE] + 180) % 360 - 180)  # type: ignore[attr-defined]
+        return {**moved, EYE: eye}
 
     def still(self) -> Picture | None:
         return self._picture
