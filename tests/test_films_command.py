@@ -110,6 +110,20 @@ def test_a_calibration_is_checked_by_a_film(films, capsys, longer, verdicts):
     assert any("left.avi: " in note and " frames were chosen, of " in note for note in said["notes"])
 
 
+@pytest.mark.thorough
+@pytest.mark.parametrize(("apart", "verdicts"), [(0.08, "pass warn inconclusive"), (0.095, "fail")])
+def test_a_pair_is_checked_by_its_two_films(films, capsys, apart, verdicts):
+    """A rig with its true baseline is not refused; one whose cameras have moved apart by 15 mm is."""
+    beside = LEFT.at(RigidTransform.from_translation([apart, 0, 0]))
+    pair = Calibration({"left": LEFT, "right": beside}, Path("pair.yaml"), "kalibr", board=BOARD)
+    write(pair, "pair.yaml", "kalibr")
+    words = ["--board", "7x5", "--square-mm", "30", "--finder", "classic", "--frames", "20", "--json"]
+    main(["check", "pair.yaml", "left.avi", "--right", "right.avi", *words])
+    said = json.loads(capsys.readouterr().out)
+    assert said["verdict"] in verdicts.split()
+    assert sum(" frames were chosen, of " in note for note in said["notes"]) == 2
+
+
 def test_what_films_cannot_be_is_refused_in_one_sentence(films, room, capsys):
     def why(*words):
         return refused(capsys, room, "calibrate", *words, *WORDS)

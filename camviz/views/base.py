@@ -146,18 +146,14 @@ class View:
     def with_panels(self, opened: Mapping[str, bool]) -> Self:
         """The view with panels opened (True) or closed (False), by their names; those opened come last.
 
-        What the view has worked out stays, so that a panel opens at once.
-
-        Raises ValueError for a panel that is not openable.
+        What it has worked out stays. Raises ValueError for a panel that is not openable.
         """
         for name in opened:
             one_of("a panel to open", name, self.openable)
         now = self._panels.split()
         kept = [name for name in now if opened.get(name, True)]
         kept += [name for name, wanted in opened.items() if wanted and name not in now]
-        if kept == now:
-            return self
-        changed = self.but(panels=" ".join(kept))
+        changed = self if kept == now else self.but(panels=" ".join(kept))
         vars(changed).update({name: vars(self)[name] for name in self._worked_out if not name.startswith("_")})
         return changed
 
@@ -224,10 +220,7 @@ class OrbitView(View):
         over: str = "",
         **heading: str,
     ) -> Drawn:
-        """The panel with the things in it as a wireframe, and marks `over` them; `heading` is what `Panel.show` takes.
-
-        It is seen by `eye`, the field where there is no other.
-        """
+        """The panel with things in wireframe, seen by `eye` or the field; marks `over` them; `heading` is for `show`."""
         heading = {"hint": "drag to turn", "drag": "eye"} | heading
         content, attached = draw_space(
             panel, list(items), eye or self.eye, draft=draft, renderer="wire", scenery=scenery
