@@ -220,7 +220,7 @@ class OrbitView(View):
         over: str = "",
         **heading: str,
     ) -> Drawn:
-        """The panel with things in wireframe, seen by `eye` or the field; marks `over` them; `heading` is for `show`."""
+        """A panel with things in wireframe, seen by `eye` or the field; marks `over` them; `heading` is for `show`."""
         heading = {"hint": "drag to turn", "drag": "eye"} | heading
         content, attached = draw_space(
             panel, list(items), eye or self.eye, draft=draft, renderer="wire", scenery=scenery
