@@ -36,8 +36,8 @@ def disparity(
 
     d is sought from 0 to `disparities` − 1, so that the first `disparities` columns have none. "BM" is block matching
     by the sum of absolute differences (Konolige); "SGM" semi-global matching (Hirschmüller); "SGM + WLS" the same in
-    both directions, filtered along the left picture's edges by weighted least squares (Min), which fills holes. What
-    only one camera sees is left out, but of "BM" with blocks of more than 21 pixels.
+    both directions, filtered along the left picture's edges by weighted least squares (Min), which fills holes. "SGM"
+    and "BM" leave out what only one camera sees; "BM" does not with blocks of more than 21 pixels.
 
     Args:
         left, right: (height, width) or (height, width, 3), a rectified pair, grey or sRGB, uint8.

@@ -222,9 +222,8 @@ class OrbitView(View):
     ) -> Drawn:
         """A panel with things in wireframe, seen by `eye` or the field; marks `over` them; `heading` is for `show`."""
         heading = {"hint": "drag to turn", "drag": "eye"} | heading
-        content, attached = draw_space(
-            panel, list(items), eye or self.eye, draft=draft, renderer="wire", scenery=scenery
-        )
+        onlooker = eye or self.eye
+        content, attached = draw_space(panel, list(items), onlooker, draft=draft, renderer="wire", scenery=scenery)
         return panel.show(content + over, title=title, label=label, **heading), attached
 
 

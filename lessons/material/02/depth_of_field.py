@@ -244,7 +244,8 @@ class DepthOfFieldView(View):
     @property
     def _photographed_alone(self) -> Self:
         """The view as far as its photograph depends on it: another panel has nothing traced anew."""
-        return replace(self, panels="photograph", hold="f-number", diffraction=True, bounds=True)
+        nobodys: dict[str, Any] = {"yours": None, "your_limits": None}
+        return replace(self, panels="photograph", hold="f-number", diffraction=True, bounds=True, **nobodys)
 
     @cached_property
     def _layout(self) -> dict[str, Cell]:
