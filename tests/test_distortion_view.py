@@ -253,3 +253,11 @@ def test_a_wrong_function_bends_a_given_photograph_otherwise_in_each_mode():
         shown = DistortionView(k1=-0.2, k2=0.0, yours=turned, **state).figure(draft=True).photographs
         camera, yours = (cv2.imdecode(np.frombuffer(shown[name], np.uint8), 1) for name in ("camera", "yours"))
         assert cv2.PSNR(camera, yours) < 15
+
+
+def test_a_panel_that_opens_takes_no_photograph_again():
+    view = DistortionView.by_the_wall(k1=-0.2, yours=lambda xy, k1, k2, k3: 1.1 * xy, panels="picture yours")
+    view.figure()
+    opened = view.with_panels({"curve": True})
+    assert opened.photographs is view.photographs
+    assert set(view.photographs) == {("camera", False), ("yours", False)}

@@ -6,7 +6,7 @@ import sys
 from base64 import b64encode
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import anywidget
 import numpy as np
@@ -187,6 +187,25 @@ class Heavy(Toy):
         common = np.random.default_rng(17).bytes(20_000).hex()
         drawn = f"<path d='{common}'/><circle r='{self.height:g}'/>"
         return Picture.whole(drawn, 10, 10, "Heavy", f"height {self.height:g}")
+
+
+@dataclass(frozen=True)
+class Steep(Toy):
+    """A view that is alike at both ends and in the middle, so that the fewest positions foretell too little."""
+
+    drawn: ClassVar[list[float]] = []
+
+    def figure(self, *, draft: bool = False) -> Picture:
+        self.drawn.append(self.height)
+        rng = np.random.default_rng(int(1000 * self.height) if self.height % 0.5 else 17)
+        return Picture.whole(f"<path d='{rng.bytes(9_000).hex()}'/>", 10, 10, "Steep", f"height {self.height:g}")
+
+
+def test_no_share_is_drawn_that_what_was_too_large_foretells_to_be_too_large(tmp_path):
+    Steep.drawn.clear()
+    made = record(explore(Steep(), "height"), tmp_path, budget=Budget(size=100_000))
+    assert made.counts["height"] == 11
+    assert len(set(Steep.drawn)) == 21  # 3 and 21, which were too large, and 11 of these; 15 would have been others
 
 
 def test_what_all_positions_have_in_common_takes_no_position_away(tmp_path):

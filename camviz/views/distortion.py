@@ -252,15 +252,24 @@ class DistortionView(OrbitView):
     # The picture -----------------------------------------------------------------------------------------------------
 
     def image(self, *, draft: bool) -> np.ndarray:
-        small = self._small_camera(draft)
-        picture = self._taken(small, draft)
-        return picture if self.show == "distorted" else self._fetched(picture, small, self._bend)
+        picture = self._taken(draft)
+        return picture if self.show == "distorted" else self._fetched(picture, self._bend)
 
-    def _small_camera(self, draft: bool) -> Camera:
-        return Camera(self.intrinsics.within(garden.DRAFT if draft else garden.FINE), self.camera.lens)
+    @cached_property
+    def photographs(self) -> dict[tuple[str, bool], np.ndarray]:
+        """What was taken so far, by whose lens it was ("camera" or "yours") and whether it is a draft."""
+        return {}
 
-    def _taken(self, camera: Camera, draft: bool) -> np.ndarray:
-        """What the camera takes: the given photograph in its size, or a picture of the virtual scene."""
+    def _taken(self, draft: bool, whose: str = "camera") -> np.ndarray:
+        """What the camera takes with its own lens or the reader's: kept, for a panel that opens shows the same."""
+        if (whose, draft) not in self.photographs:
+            lens = self._your_lens if whose == "yours" else self.camera.lens
+            small = Camera(self.intrinsics.within(garden.DRAFT if draft else garden.FINE), lens)
+            self.photographs[whose, draft] = self._scene_taken(small, draft)
+        return self.photographs[whose, draft]
+
+    def _scene_taken(self, camera: Camera, draft: bool) -> np.ndarray:
+        """The given photograph in the camera's size, or a picture of the virtual scene."""
         if self.photograph is None and self.place == "wall":
             return snapshot(wall_scene(), camera)
         if self.photograph is None:
@@ -268,10 +277,11 @@ class DistortionView(OrbitView):
         size = (camera.intrinsics.width, camera.intrinsics.height)
         return cv2.resize(self.photograph, size, interpolation=cv2.INTER_AREA)
 
-    def _fetched(self, picture: np.ndarray, camera: Camera, bend: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    def _fetched(self, picture: np.ndarray, bend: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
         """The straight picture: undistorting evaluates the forward model at every output pixel."""
-        xy = camera.intrinsics.from_pixels(camera.intrinsics.grid())
-        uv = np.nan_to_num(camera.intrinsics.to_pixels(bend(xy)), nan=-9, posinf=-9, neginf=-9).astype(np.float32)
+        pixels = self.intrinsics.resized(*picture.shape[1::-1])
+        uv = pixels.to_pixels(bend(pixels.from_pixels(pixels.grid())))
+        uv = np.nan_to_num(uv, nan=-9, posinf=-9, neginf=-9).astype(np.float32)
         return cv2.remap(picture, uv, None, cv2.INTER_LINEAR, borderValue=(38, 44, 54))
 
     def _bend(self, xy: np.ndarray) -> np.ndarray:
@@ -327,12 +337,12 @@ class DistortionView(OrbitView):
 
         A given photograph is bent as the lens bent it: straightened by the lens, it is bent again by the function.
         """
-        small, written = self._small_camera(draft), self._your_lens
+        written = self._your_lens
         if self.show == "undistorted":
-            return self._fetched(self._taken(small, draft), small, written.bend)
+            return self._fetched(self._taken(draft), written.bend)
         if self.photograph is None:
-            return self._taken(Camera(small.intrinsics, written), draft)
-        return self._fetched(self._taken(small, draft), small, lambda xy: self._bend(written.straightened(xy)))
+            return self._taken(draft, "yours")
+        return self._fetched(self._taken(draft), lambda xy: self._bend(written.straightened(xy)))
 
     def _fold_circle(self, panel: Panel, *, bent: bool) -> str:
         """Where the radial curve turns back, among ideal points or, `bent`, where the lens puts them."""

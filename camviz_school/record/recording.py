@@ -196,6 +196,7 @@ class _Recorder:
         self._source, source = script(pane.sources)
         self._scripts = {self._source: source}
         self._says = ""
+        self._too_large: tuple[int, int] | None = None  # the fewest states that broke the budget, and their bytes
 
     def recording(self) -> RecordedPane:
         """The finest of SHARES that holds the budget, as far as the coarser ones foretell it."""
@@ -207,18 +208,25 @@ class _Recorder:
         return self._written(kept)
 
     def _finer(self, kept: RecordedPane) -> RecordedPane | None:
-        """The finest recording that should hold the budget by the size of `kept`, and does; None where none is finer.
-
-        What a pane takes whatever its positions counts with each of them, so that few positions foretell too much.
-        """
+        """The finest recording that should hold the budget by what was drawn so far, and does; None: there is none."""
         for share in SHARES[:-1]:
             states = len(self._states(self._sheets(share)))
-            more = states / kept.positions
-            if more > 1 and kept.size * more <= self._budget.size and states <= self._budget.positions:
+            fits = self._foretold(states, kept) <= self._budget.size and states <= self._budget.positions
+            if states > kept.positions and fits:
                 finer = self._within(share)
                 if finer:
                     return finer
         return None
+
+    def _foretold(self, states: int, kept: RecordedPane) -> float:
+        """The bytes of that many states: as many each as `kept` has, or on the line from it to what was too large.
+
+        What a pane takes whatever its positions counts with each of them, so that few positions foretell too much.
+        """
+        if not self._too_large:
+            return kept.size * states / kept.positions
+        most, size = self._too_large
+        return kept.size + (size - kept.size) * (states - kept.positions) / (most - kept.positions)
 
     def _within(self, share: float) -> RecordedPane | None:
         """The recording with that share of the positions; None where it breaks the budget, which `_says` why."""
@@ -232,6 +240,7 @@ class _Recorder:
         if size > self._budget.size:
             limit = f"{self._budget.size / 1e6:g} MB: they take {size / 1e6:.1f} MB"
             self._says = f"{self._pane.title}: its fewest positions, {len(states)}, do not fit into {limit}."
+            self._too_large = len(states), size
             return None
         self._scripts[pack] = content
         counts = {sheet.axes[0].name: len(sheet.values[0]) for sheet in sheets if len(sheet.axes) == 1}
