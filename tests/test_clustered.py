@@ -132,7 +132,7 @@ def test_it_is_what_solving_without_each_view_gives(cameras) -> None:
     off = np.array([values(solved.only(views != left).refined()) - values(solved) for left in views])
     count = off.shape[1]
     expected = np.sqrt(11 / 12 * np.sum(off**2, axis=0))
-    np.testing.assert_allclose(np.sqrt(np.diag(solved.covariance))[:count], expected, rtol=0.03)
+    np.testing.assert_allclose(np.sqrt(np.diag(solved.clustered_covariance))[:count], expected, rtol=0.03)
 
 
 def test_a_prior_on_the_lens_counts_as_it_does_for_independent_corners() -> None:

@@ -12,12 +12,12 @@ from scipy.special import fdtrc
 from camviz.lenses.base import Array
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.cross_validation import held_out_rms
+from camviz_clinic.calibration.linearisation import FEWEST_FOR_A_BEND
 from camviz_clinic.calibration.regularisation import regularised
 
 BOARD_WARP = ("off", "auto", "on")  # solved for never, where it earns its place, always
 FALSE_ALARMS = 0.01  # the share of flat boards of which the views alone would say that they are bent
 CERTAIN = 1e-3  # where so few flat boards have views that agree like that, no held-out views are asked
-FEWEST_VIEWS = 6  # with fewer, the scatter of the views is a guess
 FOLDS = 5
 Solution = TypeVar("Solution", bound=Adjustment)
 
@@ -42,7 +42,7 @@ class WarpTest:
     @property
     def deviation_mm(self) -> Array:
         """The standard deviations (2,) of the two sagittas in millimetres."""
-        return 1000 * np.sqrt(np.diag(self.bent.covariance)[-2:])
+        return 1000 * np.sqrt(np.diag(self.bent.clustered_covariance)[-2:])
 
     @property
     def bend_mm(self) -> float:
@@ -82,13 +82,9 @@ def probability_by_views(adjustment: Adjustment) -> float:
     1 with fewer than six views that have a say. Source: Hotelling (1931), "The generalization of Student's ratio".
     """
     views = int(adjustment.posed.sum())
-    if views < FEWEST_VIEWS:
+    if views < FEWEST_FOR_A_BEND:
         return 1.0
-    bent = adjustment if adjustment.warp is not None else replace(adjustment, warp=np.zeros(2))
-    assert bent.warp is not None
-    place = bent.warp_place
-    warp = bent.warp + bent.normal_equations.solution()[0][place]
-    statistic = warp @ np.linalg.solve(bent.covariance[place, place], warp) * (views - 2) / (2 * (views - 1))
+    statistic = adjustment.bend_statistic * (views - 2) / (2 * (views - 1))
     return float(fdtrc(2, views - 2, statistic)) if np.isfinite(statistic) else 1.0
 
 

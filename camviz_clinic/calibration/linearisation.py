@@ -13,16 +13,21 @@ from camviz.lenses.base import Array
 from camviz_clinic.calibration.arrowhead import Arrowhead
 from camviz_clinic.calibration.clustered import FEWEST_VIEWS, ByView
 from camviz_clinic.calibration.jacobian import pixel_jacobian, twist_jacobian
+from camviz_clinic.calibration.model_choice import unconditional, weight_of_more
 from camviz_clinic.calibration.problem import POSE, Problem
 from camviz_clinic.calibration.types import Board
+
+FEWEST_FOR_A_BEND = 6  # views: the scatter of fewer is a guess
+TOLD = 0.01  # of the board's length, the largest σ with which views tell its bend
 
 
 @dataclass(frozen=True, eq=False)
 class Linearisation(Problem):
     """The problem near its own cameras and poses, where a pixel is a linear function of the parameters.
 
-    `covariance` is by the scatter of the views (`ByView`), and so is all that follows from it, unless the problem has
-    `independent_corners`. What the noise of corners alone would give is `corner_covariance`.
+    `covariance` is by the scatter of the views (`ByView`) and by whether the board is flat, and so is all that follows
+    from it, unless the problem has `independent_corners` or a `certain_board`. What the noise of corners alone would
+    give is `corner_covariance`.
 
     The covariances of poses are those of their twists. A prior counts in them as what it is, a measurement that nobody
     made: they are Bayes' for a lens drawn from it, σ² (JᵀJ + PᵀP)⁻¹ with P of the prior's rows, which is the scatter of
@@ -107,11 +112,47 @@ class Linearisation(Problem):
         return self.sigma**2 * self.normal_equations.covariance
 
     @cached_property
-    def covariance(self) -> Array:
-        """Of the shared `parameters`, (s, s), by the scatter of the views; of fewer than three, `corner_covariance`."""
+    def clustered_covariance(self) -> Array:
+        """Of the shared `parameters`, (s, s), by the scatter of the views; of fewer than three, `corner_covariance`.
+
+        The board counts as flat, or as bent, as the problem has it.
+        """
         if self.independent_corners or self.posed.sum() < FEWEST_VIEWS or not np.isfinite(self.sigma):
             return self.corner_covariance
         return self.by_view.covariance(self.sigma)
+
+    @cached_property
+    def covariance(self) -> Array:
+        """`clustered_covariance`, and what six views or more leave open: whether the board is flat (`unconditional`).
+
+        One step leads to the solution with the other board: the problem is linear over so small a bend. Views that
+        do not tell a bend to a hundredth of the board's length say nothing about it.
+        """
+        certain = self.independent_corners or self.certain_board
+        if certain or self.posed.sum() < FEWEST_FOR_A_BEND or not self.parameters:
+            return self.clustered_covariance
+        if self.warp is None:
+            bent, s = replace(self, warp=np.zeros(2)), len(self.parameters)  # the bend is last among the parameters
+            if not np.diag(bent.clustered_covariance)[s:].max() < (TOLD * self.board.length) ** 2:
+                return self.clustered_covariance
+            other, change = bent.clustered_covariance[:s, :s], bent.normal_equations.solution()[0][:s]
+            return unconditional(self.clustered_covariance, other, change, self._weight_of_bend)
+        flat = replace(self, warp=None)
+        other, change = np.pad(flat.clustered_covariance, (0, 2)), flat.normal_equations.solution()[0]
+        return unconditional(self.clustered_covariance, other, np.append(change, -self.warp), 1 - self._weight_of_bend)
+
+    @property
+    def _weight_of_bend(self) -> float:
+        return weight_of_more(self.bend_statistic, int(self.posed.sum()), parameters=2)
+
+    @cached_property
+    def bend_statistic(self) -> float:
+        """Hotelling's T² of the board's two sagittas by the scatter of the views: wᵀ V⁻¹ w, one step from here."""
+        place = self.warp_place
+        if self.warp is None or place is None:
+            return replace(self, warp=np.zeros(2)).bend_statistic
+        warp = self.warp + self.normal_equations.solution()[0][place]
+        return float(warp @ np.linalg.pinv(self.clustered_covariance[place, place], hermitian=True) @ warp)
 
     @cached_property
     def by_corners(self) -> Self:

@@ -33,7 +33,8 @@ class Problem:
     `detections` (views, corners, 2) in pixels are NaN where no corner was seen. Corners `set_aside` (views, corners)
     have residuals, but are not fitted (have no say). Nor is a view of fewer than four corners, or of corners on one
     line. `priors` are what is assumed of a camera's lens beforehand. With `independent_corners` it is known that the
-    noise of corners is all that they are off by, and that it is each corner's own: so it is of a virtual camera.
+    noise of corners is all that they are off by, and that it is each corner's own: so it is of a virtual camera. With
+    `certain_board` the board is known to be as flat, or as bent, as the problem has it.
     """
 
     board: Board
@@ -45,6 +46,7 @@ class Problem:
     warp: Array | None = None
     priors: Mapping[str, DenominatorPrior] = field(default_factory=dict)
     independent_corners: bool = False
+    certain_board: bool = False
 
     def __post_init__(self) -> None:
         for name in self.cameras:

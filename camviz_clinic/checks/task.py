@@ -1,6 +1,6 @@
 """What a calibration is worth to its task: directions in degrees, places in millimetres, and the depths of a pair.
 
-All of it is one standard deviation, by the scatter of the views. What is wrong alike in all views is not in it.
+All of it is one standard deviation, as `Adjustment.covariance` has it. What is wrong alike in all views is not in it.
 """
 
 from __future__ import annotations

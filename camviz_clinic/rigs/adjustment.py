@@ -43,8 +43,11 @@ class RigAdjustment(Adjustment):
     A camera's pixels depend on its own intrinsics, its own place and the board's pose, so that its rows of the Jacobian
     are kept by these alone (Triggs et al. 2000, section 6.1: the board poses are eliminated frame by frame).
 
-    What are views elsewhere are frames here: moments of the whole rig, whose scatter gives the `covariance`.
+    What are views elsewhere are frames here: moments of the whole rig, whose scatter gives the `covariance`. Its board
+    counts as solved: the frames of many cameras leave little open of it, and several boards have no bend.
     """
+
+    certain_board: bool = True
 
     @property
     def fewest(self) -> int:

@@ -51,7 +51,7 @@ def test_the_views_of_the_lens(says):
 
 def test_the_sensor_and_the_panel_that_shows_a_part_of_it(says):
     wide, tall, n, again = says(
-        "The right panel shows the sensor around the mark: 12 × 9 microlenses, with 9 × 9 pixels under each."
+        "The second panel shows the sensor around the mark: 12 × 9 microlenses, with 9 × 9 pixels under each."
     )
     view = LightFieldView(panels="picture sensor")
     shown = view._under_the_microlenses()

@@ -33,7 +33,7 @@ class Disagreement:
         """Of a camera's solution without the corners that are far out."""
         best = observed.best
         place = best.intrinsics_of(observed.name)
-        variances = (np.diag(each)[place] for each in (best.covariance, best.corner_covariance))
+        variances = (np.diag(each)[place] for each in (best.clustered_covariance, best.corner_covariance))
         return cls(float(np.median(np.sqrt(np.divide(*variances)))), ViewByView.of(best).chance_of_scatter)
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass, field
+from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any, Self
 
@@ -166,7 +166,8 @@ class BoardPictures(View):
         corners = {"camera": self.corners[self.used]}
         virtual = self.seen is None
         estimated = {"camera": FREE[self.free]}
-        return Adjustment(self.board, {"camera": camera}, corners, poses, estimated, independent_corners=virtual)
+        problem = Adjustment(self.board, {"camera": camera}, corners, poses, estimated)
+        return replace(problem, independent_corners=virtual, certain_board=True)
 
     def _sensible(self, K: Array) -> bool:
         (fx, _, cx), (_, fy, cy) = K[:2]

@@ -145,4 +145,5 @@ def _solved(set_up: SetUp, corners: Array, estimated: tuple[str, ...]) -> Adjust
     """The least squares near the truth; what is not estimated is 0."""
     start = with_parameters(set_up.camera, dict.fromkeys({"k1", "k2", "p1", "p2"} - set(estimated), 0.0))
     detections, poses = {"camera": corners}, set_up.cam_from_board
-    return Adjustment(BOARD, {"camera": start}, detections, poses, {"camera": estimated}).refined()
+    known = {"camera": estimated}
+    return Adjustment(BOARD, {"camera": start}, detections, poses, known, certain_board=True).refined()
