@@ -30,9 +30,9 @@ def weight_of_more(statistic: float, views: int, parameters: int) -> float:
 def unconditional(covariance: Array, other: Array, change: Array, weight: float) -> Array:
     """The covariance (s, s) about a chosen solution, where an `other` one, off by `change` (s,), has that `weight`.
 
-    (1 - w) C + w (C' + d dᵀ): the mean square of what the parameters are off by, over both models. Source: Buckland,
-    Burnham & Augustin (1997), "Model selection: an integral part of inference", Biometrics 53, 603, eq. 9, about the
-    chosen solution in place of a mean of both.
+    (1 - w) C + w (C' + d dᵀ): the mean square of what the parameters are off by, over both models. Source: Burnham &
+    Anderson (2004), "Multimodel inference: understanding AIC and BIC in model selection", Sociological Methods &
+    Research 33, 261, eq. 4, about the chosen solution in place of a mean of both.
 
     >>> unconditional(np.eye(1), 2 * np.eye(1), np.array([3.0]), 0.5)
     array([[6.]])
