@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from boards import board_poses, noisy, truth
+from scipy.spatial.transform import RigidTransform, Rotation
 from scipy.stats import multivariate_normal
 
 from camviz_clinic.calibration.board_warp import probability_by_views
@@ -84,3 +85,20 @@ def held(solutions, exact, covariance):
     true, place = exact.intrinsics("camera"), solutions[0].intrinsics_of("camera")
     z = [(one.intrinsics("camera") - true) / np.sqrt(np.diag(covariance(one))[place]) for one in solutions]
     return float(np.mean(np.abs(z) < NORMAL_95))
+
+
+def test_views_that_do_not_tell_a_bend_to_a_hundredth_of_the_boards_length_have_no_say_about_it():
+    """Eight boards nearly parallel to the picture, with more and more noise: the bend is told less and less."""
+    rng = np.random.default_rng(3)
+    middles = rng.uniform([-0.15, -0.1, 0.4], [0.05, 0.02, 0.6], (8, 3))
+    poses = RigidTransform.from_components(middles, Rotation.from_rotvec(rng.normal(0, 0.01, (8, 3))))
+    told, counted = [], []
+    for noise in np.arange(0.3, 1.0, 0.1):
+        start = noisy(truth(poses, estimated=("fx", "fy", "k1")), np.random.default_rng(4), noise)
+        flat = start.refined()
+        bend = replace(flat, warp=np.zeros(2)).clustered_covariance[-2:, -2:]
+        told.append(np.sqrt(np.diag(bend).max()) < 0.01 * flat.board.length)
+        counted.append(not np.array_equal(flat.covariance, flat.clustered_covariance))
+    assert counted == told
+    assert told[0]
+    assert not told[-1]
