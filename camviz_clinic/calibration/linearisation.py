@@ -136,7 +136,7 @@ class Linearisation(Problem):
             if not np.diag(bent.clustered_covariance)[s:].max() < (TOLD * self.board.length) ** 2:
                 return self.clustered_covariance
             other, change = bent.clustered_covariance[:s, :s], bent.normal_equations.solution()[0][:s]
-            return unconditional(self.clustered_covariance, other, change, self._weight_of_bend)
+            return unconditional(self.clustered_covariance, other, change, bent._weight_of_bend)
         flat = replace(self, warp=None)
         other, change = np.pad(flat.clustered_covariance, (0, 2)), flat.normal_equations.solution()[0]
         return unconditional(self.clustered_covariance, other, np.append(change, -self.warp), 1 - self._weight_of_bend)
@@ -147,12 +147,18 @@ class Linearisation(Problem):
 
     @cached_property
     def bend_statistic(self) -> float:
-        """Hotelling's T² of the board's two sagittas by the scatter of the views: wᵀ V⁻¹ w, one step from here."""
+        """Hotelling's T² of the board's two sagittas by the scatter of the views: wᵀ V⁻¹ w, one step from here.
+
+        NaN where nothing tells V: there are no more measurements than unknowns.
+        """
         place = self.warp_place
         if self.warp is None or place is None:
             return replace(self, warp=np.zeros(2)).bend_statistic
+        covariance = self.clustered_covariance[place, place]
+        if not np.isfinite(covariance).all():
+            return np.nan
         warp = self.warp + self.normal_equations.solution()[0][place]
-        return float(warp @ np.linalg.pinv(self.clustered_covariance[place, place], hermitian=True) @ warp)
+        return float(warp @ np.linalg.pinv(covariance, hermitian=True) @ warp)
 
     @cached_property
     def by_corners(self) -> Self:

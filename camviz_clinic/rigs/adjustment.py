@@ -44,7 +44,7 @@ class RigAdjustment(Adjustment):
     are kept by these alone (Triggs et al. 2000, section 6.1: the board poses are eliminated frame by frame).
 
     What are views elsewhere are frames here: moments of the whole rig, whose scatter gives the `covariance`. Its board
-    counts as solved: the frames of many cameras leave little open of it, and several boards have no bend.
+    counts as solved (`certain_board`): so its ± was measured, and several boards have no bend.
     """
 
     certain_board: bool = True

@@ -83,19 +83,16 @@ def timed(go: Go, evaluate: Evaluate, address: str, prepare: str) -> str:
 
 def main(lessons: tuple[str, ...]) -> None:
     """Time, and print the table."""
-    columns = []
+    names, columns = [name for name in LESSONS if name[:2] in lessons], []
     with files_served(SITE) as address:
         for browser in (in_chromium, in_firefox):
             with browser() as (go, evaluate):
                 floor = timed(go, evaluate, f"{address}/index.html", FLOOR)
-                pages = [f"{address}/lessons/{name}.html" for name in LESSONS if name[:2] in lessons]
+                pages = [f"{address}/lessons/{name}.html" for name in names]
                 columns.append([floor, *(timed(go, evaluate, page, FIRST) for page in pages)])
     head = ["slider to pixels, median and p95 in ms", "Chromium", "Firefox"]
-    names = [
-        "a word on an empty page (the floor)",
-        *(f"lesson {name[:2]}, first pane" for name in LESSONS if name[:2] in lessons),
-    ]
-    print(table(head, [list(row) for row in zip(names, *columns, strict=True)]))
+    rows = ["a word on an empty page (the floor)", *(f"lesson {name[:2]}, first pane" for name in names)]
+    print(table(head, [list(row) for row in zip(rows, *columns, strict=True)]))
 
 
 if __name__ == "__main__":
