@@ -154,11 +154,8 @@ class Linearisation(Problem):
         place = self.warp_place
         if self.warp is None or place is None:
             return replace(self, warp=np.zeros(2)).bend_statistic
-        covariance = self.clustered_covariance[place, place]
-        if not np.isfinite(covariance).all():
-            return np.nan
         warp = self.warp + self.normal_equations.solution()[0][place]
-        return float(warp @ np.linalg.pinv(covariance, hermitian=True) @ warp)
+        return float(warp @ np.linalg.pinv(self.clustered_covariance[place, place], hermitian=True) @ warp)
 
     @cached_property
     def by_corners(self) -> Self:
