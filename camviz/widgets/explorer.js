@@ -331,6 +331,7 @@ function loaded(address) {
   return new Promise((done) => {
     image.onload = image.onerror = () => done(image);
     image.src = address;
+    if (image.complete) done(image);   // at hand already: Firefox tells that only a frame later
   });
 }
 
