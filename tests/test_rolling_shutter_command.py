@@ -59,6 +59,16 @@ def test_a_delay_that_is_given_is_held(film, capsys):
     assert camviz_clinic.load("camera.yaml").line_delays["camera"] == LineDelay(104.2e-6)
 
 
+@pytest.mark.thorough
+def test_the_corners_of_a_film_in_bursts_are_saddles_unless_a_finder_is_named(film, capsys):
+    plain = [word for word in WORDS if word not in ("--finder", "classic")] + ["--rolling-shutter", "104.2"]
+    found = {}
+    for finder in ([], ["--finder", "saddles"], ["--finder", "auto"]):
+        assert main(["calibrate", "film.avi", *plain, *finder]) == 0
+        found["".join(finder[1:])] = camviz_clinic.load("camera.yaml").cameras["camera"].intrinsics
+    assert found[""] == found["saddles"] != found["auto"]
+
+
 @pytest.mark.parametrize(
     ("words", "why"),
     [

@@ -124,7 +124,9 @@ def add(commands: Any) -> None:
     )
     add_rolling(command)
     command.add_argument("--keep-outliers", action="store_true", help="set nothing aside")
-    command.add_argument("--finder", choices=FINDERS, default="auto", help="how chessboards are found")
+    command.add_argument(
+        "--finder", choices=FINDERS, help="how chessboards are found (default: auto; with --rolling-shutter saddles)"
+    )
     command.add_argument("--workers", metavar="N", type=_count, help="processes (default: one for each processor)")
     add_seconds(command)
     command.add_argument(
@@ -339,7 +341,9 @@ def _solved(solve: Callable[[], Calibration], skipped: Sequence[tuple[str, str]]
 
 
 def _search(options: argparse.Namespace) -> dict[str, Any]:
-    return {"finder": options.finder, "workers": options.workers, "seconds": options.seconds}
+    """Saddles for a film in bursts: what sectors are off by lasts from frame to frame, and is not in the ±."""
+    finder = options.finder or ("saddles" if is_rolling(options) else "auto")
+    return {"finder": finder, "workers": options.workers, "seconds": options.seconds}
 
 
 def _how(options: argparse.Namespace) -> dict[str, Any]:
