@@ -56,6 +56,13 @@ def test_the_picture_begins_on_the_first_screen_and_fits_a_small_one_with_its_co
     assert found.evaluate("root => hands.controls(root)") == ["k1"]
 
 
+def test_a_slider_is_long_enough_for_its_steps(lesson):
+    many = lesson.page.query_selector_all(".camviz-explorer")
+    assert max(len(one.query_selector_all("[data-control]")) for one in many) > 3  # in two columns; else one row each
+    lengths = [track.bounding_box()["width"] for one in many for track in one.query_selector_all("input[type=range]")]
+    assert min(lengths) > 180
+
+
 @pytest.mark.parametrize("width", [375, 1366])
 def test_a_button_below_the_picture_opens_a_panel_and_closes_it_again(lesson, width):
     lesson.page.set_viewport_size({"width": width, "height": 768})
