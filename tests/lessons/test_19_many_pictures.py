@@ -54,6 +54,17 @@ def test_the_mosaic_is_opencv_s_warp_to_a_grey_level(turn):
     assert max(np.abs(shown - right)[where].max(initial=0) for where, right in places) <= 1.0
 
 
+def test_where_the_matches_leave_h_open_the_picture_says_so_and_draws_nothing_by_it():
+    view = MosaicView(turn=24.0, step=0.6, fit="floor", panels="mosaic matches numbers")
+    assert view.used.sum() < 4
+    assert view.numbers()["H is off by (mean)"] == view.numbers()["at most"] == "no H"
+    shown = view.figure().body
+    assert "it takes four matches" in shown
+    assert "nan" not in shown
+    assert "inf" not in shown
+    assert "it takes four matches" not in MosaicView(turn=24.0, panels="mosaic matches").figure().body
+
+
 def test_a_pixel_by_hand(says):
     (turn,) = says("By hand, for the middle of the second picture, after a turn of 24°")
     right, again = says("It lies 305.5 pixels to the right of the first picture's middle, which is f tan 24°.")

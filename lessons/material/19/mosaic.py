@@ -32,6 +32,7 @@ from camviz.views.yours import YOURS_HERE, is_unwritten, tried
 
 LEFT, TOP, ACROSS, DOWN = -20, -110, 1330, 700
 """The mosaic's canvas, in pixels of the first picture's plane."""
+NO_H = "No H here: it takes four matches, no three of them on one line."
 AGREES = 3.0  # px: a match that is farther off is wrong for RANSAC
 _FIRST = RigidTransform.from_rotation(Rotation.from_euler("Y", -8, degrees=True))
 _CAMERA = Camera(Intrinsics.from_fov(640, 480, 50))
@@ -192,7 +193,7 @@ class MosaicView(View):
         panel = Panel("mosaic", 10, 34, 520, 520 * DOWN / ACROSS, LEFT, LEFT + ACROSS, TOP, TOP + DOWN)
         content = svg.image("mosaic", 0, 0, panel.width, panel.height)
         content += self._marks(panel) if self._has("matches") else ""
-        problem = self.shown_H[1]
+        problem = self.shown_H[1] or (NO_H if np.isnan(self.shown_H[0]).any() else "")
         content = svg.group(content, class_="awaited") if is_unwritten(problem) else content
         content += notice(panel, problem)
         return panel.show(content, title=f"Both pictures, joined by {'your' if self.yours else 'one'} H")
@@ -201,7 +202,8 @@ class MosaicView(View):
         """A dot where the first picture has a match, and a line to where the second one's pixel comes to lie."""
         uv, to = self.matches
         ends = np.stack([panel.place(to), panel.place(warped(self.shown_H[0], uv))], axis=1)
-        far = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1) > 1.5
+        apart = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1)
+        far = (apart > 1.5) & np.isfinite(apart)
         off = on_photograph(ends[far], "red") if far.any() else ""
         kept = ends[self.used, 0]
         return off + svg.dots(ends[:, 0], "paper-dot", 7) + svg.dots(ends[:, 0], "red", 5) + svg.dots(kept, "green", 5)
@@ -214,8 +216,10 @@ def _pixels(length: float) -> str:
 
 
 def warped(H: Array, uv: Array) -> Array:
-    """Where the homography takes pixels (n, 2)."""
-    return np.asarray(cv2.perspectiveTransform(uv[:, None], H)[:, 0])
+    """Where the homography takes pixels (n, 2); NaN or infinite where it takes them nowhere."""
+    mapped = np.column_stack([uv, np.ones(len(uv))]) @ H.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(mapped[:, :2] / mapped[:, 2:])
 
 
 def notice(panel: Panel, problem: str) -> str:
