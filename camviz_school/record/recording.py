@@ -337,8 +337,9 @@ def _room(controls: Sequence[str]) -> str:
     row = "height:26px;display:flex;gap:8px;align-items:center"
     track = '<s style="flex:1;height:5px;border-radius:3px;background:#8b94a3"></s>'
     rows = "".join(f'<i style="{row};{font}">{escape(label)}{track}</i>' for label in controls)
+    grid = f"display:grid;grid-template-columns:{columns};gap:4px 22px;padding:6px 2px 8px"
     return (
-        f'<div aria-hidden="true" style="display:grid;grid-template-columns:{columns};gap:4px 22px;padding:6px 2px 8px">'
+        f'<div aria-hidden="true" style="{grid}">'
         f'{rows}<i class="camviz-foot-room" style="height:24px;grid-column:1/-1;font-size:13px"></i></div>'
     )
 
