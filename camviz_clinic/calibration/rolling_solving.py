@@ -128,7 +128,7 @@ def with_rolling_shutter(
 
     Args:
         start: One camera, solved for as if all rows were read at once, with its board.
-        detections: The corners, one view for each frame.
+        detections: The corners, one view for each frame; a chessboard's are nearest with finder="saddles".
         times: (frames,), in seconds.
         line_delay: From one row to the next in seconds, held; estimated unless given.
         robust: Set aside corners that the rest contradicts.
