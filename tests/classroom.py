@@ -27,11 +27,12 @@ def camviz_class(folder, *words):
         port = probe.getsockname()[1]
     command = [sys.executable, "-m", "camviz", "class", *(words or ["05"]), "--port", str(port)]
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8"}
+    last = "Ctrl-C stops" if "--host" in words else "Only this machine can join"
     with (folder / "said.txt").open("w+", encoding="utf-8") as said:
         process = subprocess.Popen(command, cwd=folder, env=environment, stdout=said, stderr=said)
         try:
             end = time.monotonic() + 120
-            while "Ctrl-C stops" not in (text := (folder / "said.txt").read_text(encoding="utf-8")):
+            while last not in (text := (folder / "said.txt").read_text(encoding="utf-8")):
                 assert process.poll() is None, text
                 assert time.monotonic() < end, text
                 time.sleep(0.05)
