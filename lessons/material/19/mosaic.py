@@ -202,8 +202,7 @@ class MosaicView(View):
         """A dot where the first picture has a match, and a line to where the second one's pixel comes to lie."""
         uv, to = self.matches
         ends = np.stack([panel.place(to), panel.place(warped(self.shown_H[0], uv))], axis=1)
-        apart = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1)
-        far = (apart > 1.5) & np.isfinite(apart)
+        far = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1) > 1.5
         off = on_photograph(ends[far], "red") if far.any() else ""
         kept = ends[self.used, 0]
         return off + svg.dots(ends[:, 0], "paper-dot", 7) + svg.dots(ends[:, 0], "red", 5) + svg.dots(kept, "green", 5)
