@@ -206,7 +206,7 @@ def test_a_reader_s_functions_are_shown_beside_the_right_ones_whatever_they_do()
     assert "2, a row or a column is off" in right
     assert "fill-orange" in right
     wrong = lab.but(yours=lambda residuals: None, verdict=lambda residuals: 7).figure().svg()
-    assert "returns nothing yet" in wrong
+    assert "yours appears here" in wrong
     assert "7, which is none of 0 to 3" in wrong
     broken = lab.but(yours=lambda residuals: residuals, verdict=lambda residuals: 1 / 0).figure().svg()
     assert "answers in shape" in broken

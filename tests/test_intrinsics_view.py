@@ -297,6 +297,18 @@ def test_unknown_panels_and_marks_are_refused(bad):
         IntrinsicsView(**bad)
 
 
+def test_what_lies_beyond_the_picture_has_no_name_in_it_and_the_principal_point_an_arrow():
+    view = IntrinsicsView.alone(marks="balloon globe centre")
+    assert named(view) == {"a balloon, behind the wall", "81 px", "(cx, cy)"}
+    assert named(view.but(fx=150.0, cx=-100.0)) == {"← (cx, cy)"}
+    assert named(view.but(fx=2000.0, cx=740.0)) == {"(cx, cy) →"}
+
+
+def named(view: IntrinsicsView) -> set[str]:
+    """What stands in the picture."""
+    return set(re.findall(r'<text[^>]* class="label[^>]*>([^<]+)<', view.figure(draft=True).body))
+
+
 def test_only_what_is_marked_is_named_in_the_picture_and_the_numbers():
     names = {"balloon": "a balloon, behind the wall", "globe": "81 px", "centre": "(cx, cy)", "corners": "(639, 359)"}
     for mark in ("", *names):

@@ -159,7 +159,7 @@ def test_a_reader_s_noise_is_drawn_beside_the_right_one_whatever_it_does():
     assert "orange thick" in drawn
     wrong = view.but(yours=lambda electrons, read_noise, prnu: read_noise + electrons).figure(draft=True).svg()
     assert wrong != drawn
-    assert "returns nothing yet" in view.but(yours=lambda *_: None).figure(draft=True).svg()
+    assert "yours appears here" in view.but(yours=lambda *_: None).figure(draft=True).svg()
     assert "ZeroDivisionError" in view.but(yours=lambda *_: 1 / 0).figure(draft=True).svg()
 
 

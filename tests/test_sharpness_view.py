@@ -88,7 +88,7 @@ def test_a_reader_s_function_is_drawn_in_orange_and_never_raises():
     wrong = view.but(yours=lambda *given: 1 / 0)
     assert "ZeroDivisionError" in wrong.figure(draft=True).svg()
     empty = view.but(yours=lambda *given: None)
-    assert "returns nothing yet" in empty.figure(draft=True).svg()
+    assert "yours appears here" in empty.figure(draft=True).svg()
     assert "orange dots" not in empty.figure(draft=True).svg()
     assert "yours" not in SharpnessView().figure(draft=True).body
 

@@ -419,7 +419,7 @@ class DistortionView(OrbitView):
         return plot.axes(panel, "r, ideal: the tangent of the angle", "r, distorted") + panel.show(
             lines
             + self._fold_mark(panel, fold)
-            + svg.text(panel.place((corner, 0)) + (-6, -8), "image corner", "green end halo"),
+            + svg.text(panel.place((0, corner)) + (8, 15), "image corner", "green halo"),
             title="Radial curve",
             note=self.equation() if equation else "",
         )
@@ -440,9 +440,8 @@ class DistortionView(OrbitView):
         if not fold < panel.right:
             return ""
         at = panel.place([fold, float(self._radial(np.array(fold)))])
-        side = "end" if at[0] > panel.width / 2 else ""
-        words = f"folds at r = {_with_angle(fold)}"
-        return svg.dots([at], "red", 9) + svg.text(at + (-8 if side else 8, -12), words, f"red halo {side}")
+        free = (np.clip(at[0] - 8, 165, 0.68 * panel.width), 17)  # at the top, left of the line of no distortion
+        return svg.dots([at], "red", 9) + svg.text(free, f"folds at r = {_with_angle(fold)}", "red end halo")
 
     # The frustum -----------------------------------------------------------------------------------------------------
 

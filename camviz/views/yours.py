@@ -128,6 +128,11 @@ def is_unwritten(problem: str) -> bool:
     return any(f" {words}, " in problem for words in _NOT_YET)
 
 
+def placeholder(problem: str) -> str:
+    """What stands where a reader's own would be: `YOURS_HERE` while nothing is written, else what is wrong with it."""
+    return YOURS_HERE if is_unwritten(problem) else problem
+
+
 def answered(function: Function | None, arguments: tuple[Any, ...], like: Any) -> tuple[Any, str]:
     """What a reader's function answers, in the shape of `like`, and what is wrong with it; NaN where there is none."""
     if function is None:

@@ -30,7 +30,7 @@ function render({ model, el }) {
   hidesStill.textContent = model.get("still_hidden");
   el.replaceChildren(hidesStill, root);
 
-  const told = {};      // picture units to a CSS pixel, by the name of the tile
+  const told = { ...model.get("frame").units };   // picture units to a CSS pixel, by the name of the tile
   const say = (words) => { error.hidden = !words; error.textContent = words; };
   const ask = asker(model, root, () => say(LATE));
   const foot = build(`<div class="camviz-foot"><button type="button" data-action="reset">Reset</button><button type="button" data-action="scale" title="for the back row: all pictures on this page with words twice as large">Large words</button><p class="camviz-help" aria-hidden="true"></p></div>`);

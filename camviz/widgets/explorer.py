@@ -188,6 +188,7 @@ class Explorer(StillWidget):
         picture = view.figure(draft=draft)
         frame: dict[str, Any] = {"html": picture.flow(self._units), "photographs": picture.photographs}
         frame |= {"described": picture.description, "answers": answers, "draft": draft, "error": ""}
+        frame["units"] = dict(self._units)
         followed = {"view": view, "value": view, "values": {name: getattr(view, name) for name in self._controls}}
         followed |= {trait: getattr(view, name) for trait, name in self._control_of.items()}
         # One message to the page; and nobody hears of a change before all of it is done.

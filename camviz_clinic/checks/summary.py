@@ -25,7 +25,10 @@ UNKNOWN = "not in the file"
 MOST_CAMERAS = 4
 RMS, MIDDLE, CORNER = "RMS error", "uncertainty, centre", "uncertainty, worst corner"
 BEND = ("board's bend along rows", "board's bend along columns")
-LEGEND = "± is one standard deviation, by the scatter of the views; uncertainty: of the pixel of a far point."
+LEGEND = (
+    "± is one standard deviation, by the scatter of the views and by whether the board is flat; "
+    "uncertainty: of the pixel of a far point."
+)
 
 
 def bend_mm(calibration: Calibration) -> tuple[list[float], list[float] | None] | None:

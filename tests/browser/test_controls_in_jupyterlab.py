@@ -203,6 +203,37 @@ def test_the_saved_picture_is_the_one_that_was_left(notebook):
     later.page.close()
 
 
+def test_a_later_view_of_a_visualizer_leaves_its_words_where_they_have_room(notebook):
+    """The kernel drew for a narrow window last, where words stand aside that need not in a wide one."""
+    run = """async (source) => {
+      const { content } = jupyterapp.shell.currentWidget;
+      content.activeCellIndex = 2;
+      content.activeCell.model.sharedModel.setSource(source);
+      await jupyterapp.commands.execute("notebook:run-cell");
+    }"""
+
+    def shown(number: int) -> str:
+        explorer = notebook.page.wait_for_selector(f".camviz-explorer >> nth={number}")
+        explorer.scroll_into_view_if_needed()
+        notebook.page.wait_for_timeout(500)  # until the tiles have their sizes, and the kernel is asked
+        explorer.evaluate("root => hands.settled(root)")
+        return explorer.evaluate("root => hands.picture(root)")
+
+    notebook.page.set_viewport_size({"width": 420, "height": 800})
+    narrow = shown(0)
+    notebook.page.evaluate("() => jupyterapp.shell.currentWidget.content.widgets[0].model.clearExecution()")
+    notebook.page.set_viewport_size({"width": 1400, "height": 800})
+    notebook.page.evaluate(run, "lens")
+    later = shown(1)
+    notebook.page.evaluate(run, "import os")
+    notebook.run_all()
+    fresh = shown(0)
+    notebook.page.set_viewport_size({"width": 1000, "height": 800})
+    shown(0)
+    assert narrow != fresh
+    assert later == fresh
+
+
 @pytest.mark.parametrize(
     ("end", "words"),
     [

@@ -6,27 +6,46 @@ import numpy as np
 
 from camviz.draw import svg
 from camviz.draw.panel import Panel
+from camviz.lenses.base import Array
 
 DEPTHS, BLURS = (0.5, 40.0), (0.002, 20.0)  # the plot's range: m and mm
+_ROOM = 4.0  # picture units between a name and what is drawn
 
 
-def levels(panel: Panel, allowed_mm: float | None, airy_mm: float | None, limits_m: tuple[float, float]) -> str:
-    """The lines of the blur that is allowed and of the Airy disc, and their names, at opposite ends.
+def levels(panel: Panel, curve: Array, allowed_mm: float | None, airy_mm: float | None) -> str:
+    """The lines of the blur that is allowed and of the Airy disc, each with its name where the `curve` leaves room.
 
-    Outside the depth of field the curve runs above the blur that is allowed: there its name stands below the line.
+    `curve` (n, 2) is in panel coordinates.
     """
-    right_is_free = limits_m[1] < (14 if limits_m[0] < 1.8 else 6)  # of the depth of field; the left is not
-    allowed = f"allowed: c = {1000 * (allowed_mm or 0):.0f} µm"
-    drawn = ""
-    for blur, name, colour, stroke, below, at_right in (
-        (allowed_mm, allowed, "green", "dashed", 14, right_is_free),
-        (airy_mm, "Airy disc", "purple", "dashed thin", -5, not right_is_free),
+    drawn, taken = "", curve
+    for blur, name, look, first in (
+        (allowed_mm, f"allowed: c = {1000 * (allowed_mm or 0):.0f} µm", ("green", "dashed"), 1),
+        (airy_mm, "Airy disc", ("purple", "dashed thin"), 0),
     ):
         if blur:
-            left, right = panel.place([(panel.left, np.log10(blur)), (panel.right, np.log10(blur))])
-            place, end = (right + (-8, below), " end") if at_right else (left + (8, below), "")
-            drawn += svg.line([left, right], f"{colour} {stroke}") + svg.text(place, name, f"{colour} halo{end}")
+            line = panel.place([(x, np.log10(blur)) for x in np.linspace(panel.left, panel.right, 99)])
+            at, anchor, box = _beside(panel, line, 7.5 * len(name), taken, first)
+            drawn += svg.line(line[[0, -1]], " ".join(look)) + svg.text(at, name, f"{look[0]} halo{anchor}")
+            taken = np.concatenate([taken, line, box])
     return drawn
+
+
+def _beside(panel: Panel, line: Array, width: float, taken: Array, first: int) -> tuple[Array, str, Array]:
+    """Where a name stands along its level `line`, its anchor, and the points (n, 2) that it takes.
+
+    Best is the `first` end, the left, 0, or the right, 1, just below. Other places are for want of room.
+    """
+    most = np.array((panel.width - width - 16, 0))
+    ways = [(share, down) for down in (14, -6, 28, -20) for share in np.abs(first - np.array((0, 1, 0.25, 0.5, 0.75)))]
+    places = []
+    for share, down in ways:
+        low = line[0] + share * most + (8, down - 11)
+        high = low + (width, 14)
+        room = np.max([low - taken, taken - high], axis=(0, 2)).min()
+        box = np.stack(np.meshgrid(np.linspace(low[0], high[0], 9), (low[1], high[1])), -1).reshape(-1, 2)
+        place = (np.array((high[0], low[1] + 11)), " end") if share == 1 else (low + (0, 11), "")
+        places.append((min(room, _ROOM, low[1], panel.height - high[1]), *place, box))
+    return max(places, key=lambda place: place[0])[1:]
 
 
 def micrometres() -> list[tuple[float, str]]:

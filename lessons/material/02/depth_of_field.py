@@ -318,7 +318,9 @@ class DepthOfFieldView(View):
             shown = without(panel, problem, title, right=right)
         else:
             globe = svg.dots([here], "blue", 10) + svg.text(here + (8, -8), "globe", "blue halo")
-            content = right + levels(panel, allowed, airy, self.limits_m) + globe + drawn
+            taken = panel.place(np.log10(np.stack([depth, blur], axis=-1)))
+            taken = np.concatenate([taken, here + np.mgrid[8:56:12, -20:-4:5].reshape(2, -1).T])
+            content = right + levels(panel, taken, allowed, airy) + globe + drawn
             shown = panel.show(content, title=title, hint="drag to focus", drag="focus", label=label)
         return axes(panel, "distance from the lens [m]", "blur [µm]", xticks, yticks, aside=56) + shown
 

@@ -200,15 +200,18 @@ class IntrinsicsView(CameraMatrix):
         cross = svg.segments(*ends, "white", style="stroke:#fff;stroke-width:6px") + svg.segments(*ends, "orange thick")
         side, dx = ("end", -8) if at[0] > self._picture.width - 80 else ("", 8)
         inside = np.clip(at + (dx, 22), (8, 36), np.array([self._picture.width, self._picture.height]) - (8, 30))
-        name = _tag(inside, "(cx, cy)", side)
+        before, after = "← " if at[0] < 0 else "", " →" if at[0] > self._picture.width else ""
+        name = _tag(inside, f"{before}(cx, cy){after}", side)
         hand = svg.element("circle", cx=at[0], cy=at[1], r=16, fill_opacity=0, class_="card")
         label = f"Principal point at column {K.cx:.1f}, row {K.cy:.1f}; arrow keys move it"
         handle = {"data_drag": "principal", "tabindex": 0, "role": "group", "aria_label": label}
         return svg.group(hand + cross + name, **handle)
 
     def _behind(self) -> str:
-        """Where the balloon is, whether or not it can be seen."""
+        """Where in the picture the balloon is, whether or not it can be seen."""
         outline = self._seen(balloon_rim(self.camera.centre))
+        if not self._in_picture(outline):
+            return ""
         hidden = self.in_sight() < 0.5
         top = outline[np.argmin(outline[:, 1])] - (0, 11)
         ring = svg.line(outline, "white", style="stroke:#fff;stroke-width:4.5px") if hidden else ""
@@ -219,6 +222,8 @@ class IntrinsicsView(CameraMatrix):
         """How wide the globe is, in the pixels of the picture after the operation."""
         ends = GLOBE + np.array([(-GLOBE_RADIUS, -GLOBE_RADIUS - 0.08, 0), (GLOBE_RADIUS, -GLOBE_RADIUS - 0.08, 0)])
         left, right = self._seen(ends)
+        if not self._in_picture((left, right)):
+            return ""
         pixels = self.intrinsics.fx * 2 * GLOBE_RADIUS / self.distance
         half = np.array((0, 5))
         bar = svg.segments([left, left - half, right - half], [right, left + half, right + half], "green thick")
@@ -227,6 +232,11 @@ class IntrinsicsView(CameraMatrix):
     def _seen(self, points: Array) -> Array:
         """Panel coordinates (..., 2) of points (..., 3) in the garden."""
         return self._as_taken(self.camera.project(points))
+
+    def _in_picture(self, at: Any) -> bool:
+        """Whether any of the panel coordinates (n, 2) is."""
+        size = self._picture.width, self._picture.height
+        return bool(np.any(np.all((np.array(at) >= 0) & (np.array(at) <= size), axis=-1)))
 
     # The rays --------------------------------------------------------------------------------------------------------
 
@@ -333,8 +343,8 @@ class IntrinsicsView(CameraMatrix):
             + svg.line(upright, "ink dotted")
             + svg.line(u, "orange thick")
             + svg.line(v, "green thick")
-            + svg.text(u[1] + (6, 4), "u", "orange halo")
-            + svg.text(v[1] + (6, 6), "v", "green halo")
+            + svg.text(np.clip(u[1] - (0, 8), 14, side - 8), "u", "orange halo middle")
+            + svg.text(np.clip(v[1] + (6, 6), 14, side - 14), "v", "green halo")
         )
         note = f"lean drawn {_LEAN_DRAWN} ×" if K.skew else ""
         return {"pixels": panel.show(content, title="Its pixels", note=note)}

@@ -32,7 +32,7 @@ class EstimateNumbers(ErrorBars):
     def _estimates(self, cell: Cell) -> str:
         left, y, width, _ = cell
         heads = ("", "true" if self.truth else "", "estimate", "± σ")
-        x = (left + 14, *(left + 14 + share * (width - 28) for share in (0.42, 0.74, 1.0)))
+        x = (left + 14, *(left + 14 + share * (width - 28) for share in (0.4, 0.7, 1.0)))
         parts = [svg.text((x[0], y + 26), "The estimate", "title")]
         if self.adjustment is None:
             return parts[0] + svg.paragraph((x[0], y + 56), NOTHING, width - 28, "label")

@@ -114,5 +114,12 @@ def _written(each: FromEach, picked: int, yours: bool, x: float, y: float) -> st
 
 
 def _pair(values: Array) -> str:
-    fx, fy = (f"{value:.1f}" if np.isfinite(value) else "none" for value in values)
+    fx, fy = map(_pixels, values)
     return true_minus(f"fx {fx}, fy {fy}")
+
+
+def _pixels(length: float) -> str:
+    """A board parallel to the picture leaves some ten digits before the point."""
+    if not np.isfinite(length):
+        return "none"
+    return f"{length:.1f}" if abs(length) < 1e5 else "over 100,000"

@@ -27,6 +27,7 @@ from camviz.sensors import DigitalCamera, Sensor, decibel
 from camviz.sensors.digital_camera import Shot
 from camviz.sensors.published import CMV4000, IMX174, KAF_0400, PublishedSensor
 from camviz.views.base import View, answered, choice, positive, slider
+from camviz.views.yours import placeholder
 from camviz_school.views.readout import in_rows
 
 SMALL, LARGE = 160, 320  # pixels across a draft and a fine picture
@@ -221,7 +222,7 @@ class ImageSensorView(View):
             y = float(panel.place((0, np.log10(max(electrons, 1))))[1])
             content += svg.line([(0, y), (panel.width, y)], f"{class_} dashed")
             content += svg.text((panel.width - 6, y - 6), f"{name} {electrons:{form}} e⁻", f"{class_} halo end")
-        problem = svg.paragraph((x + 66, y + 270), self.your_e[1], 344) if self.yours else ""
+        problem = svg.paragraph((x + 66, y + 270), placeholder(self.your_e[1]), 344) if self.yours else ""
         return (
             problem
             + axes(panel, "pixels of a white wall", "electrons", xticks, yticks, aside=54)

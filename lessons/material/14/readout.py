@@ -25,6 +25,7 @@ from camviz.lenses.base import Array
 from camviz.scenes import textured_scene, to_display
 from camviz.sensors.readout import bucket_brigade, row_times
 from camviz.views.base import View, answered, choice, positive, slider
+from camviz.views.yours import placeholder
 
 ROWS = 480  # of the sensor: what the row time counts
 LARGE = (320, 240)  # pixels of a fine picture
@@ -220,7 +221,7 @@ class ReadoutView(View):
 
     def _words(self) -> str:
         x, y, *_ = self._layout["what happens"]
-        return svg.paragraph((x + 16, y + 30), self.your_row_s[1] or _WORDS[self.readout], 238, "label")
+        return svg.paragraph((x + 16, y + 30), placeholder(self.your_row_s[1]) or _WORDS[self.readout], 238, "label")
 
     def _timing(self) -> str:
         """When each row is exposed, and when it is read."""

@@ -24,7 +24,7 @@ from camviz.sensors import Sensor
 from camviz.sensors.common_random_numbers import Draw, exposed
 from camviz.views import garden
 from camviz.views.base import View, slider, step_of, switch
-from camviz.views.yours import tried
+from camviz.views.yours import placeholder, tried
 
 FULL_WELL_E = 15_000.0
 WHITE_E_PER_S = 10_000.0  # electrons that a white surface frees in a second
@@ -310,7 +310,7 @@ class PhotonTransferView(View):
             return ""
         answer, problem = tried(self.yours, (electrons, self.read_noise_e, self.prnu / 100), electrons)
         if problem:
-            return svg.paragraph((14, 24), problem, panel.width - 28, "note halo")
+            return svg.paragraph((14, 24), placeholder(problem), panel.width - 28, "note halo")
         K = self.sensor.gain_dn_per_e
         with np.errstate(divide="ignore", invalid="ignore"):
             return plot.curve(panel, np.log10(K * electrons), np.log10(K * answer), "orange thick")

@@ -20,7 +20,7 @@ from camviz.draw.readout import listed, true_minus
 from camviz.views.base import choice, slider, switch
 from camviz.views.marks import arrows, shortened
 from camviz.views.view_bars import LABEL, ViewChooser
-from camviz.views.yours import tried
+from camviz.views.yours import placeholder, tried
 from camviz_clinic.checks.registry import Finding
 from camviz_school.views.laboratory import BOARD, VIEWS, Experiment, experiment, lab_faults
 
@@ -149,7 +149,7 @@ class FaultLabView(ViewChooser):
         answer, problem = tried(self.verdict, (residuals,), 0.0)
         x, y = self._corner("numbers", 10, 322)
         if problem:
-            return svg.paragraph((x, y), problem, 200)
+            return svg.paragraph((x, y), placeholder(problem), 200)
         known = answer in range(len(_VERDICTS))
         words = _VERDICTS[int(answer)] if known else f"{answer:g}, which is none of 0 to {len(_VERDICTS) - 1}"
         return svg.text((x, y), "Your verdict", "title") + svg.paragraph((x, y + 20), words, 200, "orange")
@@ -184,7 +184,7 @@ class FaultLabView(ViewChooser):
             return ""
         answer, problem = tried(self.yours, (self.experiment.residuals,), self.experiment.errors)
         if problem:
-            return svg.paragraph((10, 18), problem, panel.width - 20, "note halo")
+            return svg.paragraph((10, 18), placeholder(problem), panel.width - 20, "note halo")
         names = [("blue thick", "RMS of the view"), ("orange thick", "yours")]
         return plot.bars(panel, x, x + 0.38, answer, "fill-orange") + plot.legend(panel, names)
 

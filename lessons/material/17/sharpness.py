@@ -28,7 +28,7 @@ from camviz.optics import (
 )
 from camviz.scenes import to_display
 from camviz.views.base import View, positive, slider
-from camviz.views.yours import tried
+from camviz.views.yours import placeholder, tried
 
 FIELD_UM = (320, 240)  # of the sensor that the picture shows
 TOP_PER_MM = 260.0  # the curves' right end
@@ -186,7 +186,7 @@ class SharpnessView(View):
         content = nyquist + curves + self._half(panel) + yours
         names = "frequency (cycles per mm)", "MTF"
         drawn = plot.plotted(panel, content, *names, title="Contrast that is left") + self._legend(left)
-        return drawn + svg.paragraph((left + 40, 416), problem, 290)
+        return drawn + svg.paragraph((left + 40, 416), placeholder(problem), 290)
 
     def _causes(self, panel: Panel, f: np.ndarray) -> str:
         """What each cause alone leaves, and all of them."""
