@@ -50,6 +50,7 @@ def main(words):
     set_up(special or ("light" if light else "reader"))
     if special == "test":
         os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # else each worker and each command compiles the house again
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # a worker for each core: threads of its own would wait
         return run(PYTHON, *TESTS, *words[1:], cwd=ROOT)
     if special == "site":
         return run(PYTHON, ROOT / "tools/website/build.py", *words[1:], cwd=ROOT)

@@ -57,7 +57,10 @@ def test_a_bend_is_recovered_within_its_deviations_and_the_focal_length_with_it(
 
 
 def test_the_intervals_of_the_bend_hold(thorough):
-    """68 % of sagittas are within their ±, and 95 % within 1.96, whether each view has another bend besides or not."""
+    """68 % of sagittas are within their ±, and of eight views 91 % within 1.96 (Student's t with 7 degrees of freedom).
+
+    Whether each view has another bend besides or not; 0.85 is three standard errors below.
+    """
     count = 100 if thorough else 5
     for each_way in (0, 3e-4):
         ratios = []
@@ -65,7 +68,7 @@ def test_the_intervals_of_the_bend_hold(thorough):
             bent = replace(drawn(100 + seed, 8, BENT, each_way), warp=np.zeros(2)).refined()
             ratios.append((bent.warp - BENT) / np.sqrt(np.diag(bent.warp_covariance)))
         assert np.mean(np.abs(ratios) < 1) > (0.55 if thorough else 0.4)
-        assert np.mean(np.abs(ratios) < 1.96) > (0.87 if thorough else 0.7)
+        assert np.mean(np.abs(ratios) < 1.96) > (0.85 if thorough else 0.7)
         assert np.sqrt(np.mean(np.square(ratios))) > 0.6
 
 

@@ -1,5 +1,6 @@
 """Several boards before one camera or many: their places, the cameras' places, and the ± of both."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -50,16 +51,18 @@ def errors(of, true):
 @pytest.mark.sampled(1)
 @pytest.mark.parametrize("scene", SCENES)
 def test_cameras_and_boards_are_where_they_are_within_three_deviations(scene, thorough):
-    off = []
+    off, noted = [], []
     for seed in range(20 if thorough else 1):
         truth, found = solved(scene, seed, fixed=("k3",))  # boards in the middle of the picture do not decide k3
         off += [errors(*each) for each in beside(truth, found)]
-        assert found.calibration.notes == ()
+        noted += [found.calibration.notes] * bool(found.calibration.notes)
         assert abs(found.adjustment.sigma - truth.noise) < 0.01
         assert board_sentences(found) == ()
         assert not any(found.undecided.values())
         said = told_of(found, BoardsFile(truth.boards, {}, found.groups, {}))
         assert not [sentence for sentence in said if "not known" in sentence]
+    assert len(noted) <= (6 if thorough else 0)  # a corner is set aside by chance in one set of ten
+    assert not re.search(r"[02-9] of \d+ corners|views", str(noted))
     off = np.concatenate(off)
     assert (np.abs(off) < 3).mean() >= 0.99
     assert np.sqrt(np.mean(off**2)) < 1.3

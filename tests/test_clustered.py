@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from boards import CAMERA, ESTIMATED, RIGHT, board_poses, noisy, truth
 
+from camviz_clinic.calibration.arrowhead import inverse
 from camviz_clinic.calibration.clustered import ByView
 from camviz_clinic.calibration.denominator_prior import DenominatorPrior
 from camviz_clinic.calibration.linearisation import Linearisation
@@ -39,6 +40,16 @@ def by_view(X, Z, y):
     gradient = np.einsum("vns,vn->vs", X, y)
     s = X.shape[-1]
     return ByView(np.swapaxes(X, 1, 2) @ X, gradient, np.zeros((s, s)), np.zeros(s))
+
+
+def test_information_that_rounding_puts_below_zero_decides_nothing():
+    """As of the bend of one marker's four corners, which the poses follow wholly."""
+    rounded = np.array([np.diag([4.0, -1e-20])] * 3)
+    assert np.diag(inverse(rounded[0])).tolist() == [0.25, pytest.approx(1 / (2 * np.finfo(float).eps))]
+    views = ByView(rounded, np.array([[1.0, 0], [-1, 0], [0, 0]]), np.zeros((2, 2)), np.zeros(2))
+    first, other = np.diag(views.covariance(1.0))
+    assert first == pytest.approx(2 / 3 * 2 / 8**2)  # (n - 1)/n Σ δ², where two views are left with 8
+    assert other > 1e10
 
 
 def test_it_is_the_jackknife_of_a_linear_problem(linear) -> None:

@@ -1,11 +1,15 @@
 """A lesson's minutes by one rule, and the pattern of a lesson that has a core and goes deeper."""
 
+import ast
+import builtins
+import re
 from copy import deepcopy
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import nbformat
 import pytest
+from IPython.display import display
 from test_lessons import replace
 
 from camviz_school.course import core_rules, minutes, notebooks
@@ -102,6 +106,36 @@ def test_a_divided_lesson_follows_the_pattern(number):
     assert core_rules.complaints(EVERY[number], number) == []
 
 
+def code_of(cells):
+    """The code of cells as Python reads it, without `%magic` lines."""
+    sources = [cell.source for cell in cells if cell.cell_type == "code"]
+    return ast.parse("\n".join(re.sub(r"^\s*%.*$", "", source, flags=re.MULTILINE) for source in sources))
+
+
+def named(tree):
+    """The names that code gives to anything, and those that it uses."""
+    nodes, given = list(ast.walk(tree)), set()
+    for node in nodes:
+        if isinstance(node, ast.alias):
+            given.add((node.asname or node.name).partition(".")[0])
+        elif isinstance(node, ast.FunctionDef | ast.ClassDef | ast.ExceptHandler):
+            given.add(node.name)
+        elif isinstance(node, ast.arg):
+            given.add(node.arg)
+    names = [node for node in nodes if isinstance(node, ast.Name)]
+    used = {name.id for name in names if isinstance(name.ctx, ast.Load)}
+    return given | {name.id for name in names if not isinstance(name.ctx, ast.Load)}, used
+
+
+@pytest.mark.parametrize("number", LAYERED)
+def test_a_deeper_section_uses_no_name_that_only_another_one_gives(number):
+    lesson = EVERY[number]
+    known = named(code_of(minutes.core(lesson)))[0] | set(dir(builtins)) | {"display", "get_ipython"}
+    for section in minutes.sections(lesson):
+        given, used = named(code_of(section.cells))
+        assert used - given - known == set(), section.title
+
+
 OFTEN = ("05", "07")  # the others with --all: each runs its lesson's core once more
 
 
@@ -122,7 +156,7 @@ def test_each_deeper_section_runs_after_the_core_without_the_others(number, monk
                 plt.close("all")  # as a notebook does after each cell
         return namespace
 
-    core = run(minutes.core(lesson), {"__name__": "__main__"})
+    core = run(minutes.core(lesson), {"__name__": "__main__", "display": display})  # a notebook has that name, too
     for section in minutes.sections(lesson):
         run(section.cells, dict(core))
 

@@ -104,7 +104,7 @@ def inverse(matrices: Array) -> Array:
     """
     if not matrices.shape[-1]:
         return matrices
-    scale = np.sqrt(np.einsum("...ii->...i", matrices))
+    scale = np.sqrt(np.maximum(np.einsum("...ii->...i", matrices), 0))  # below 0 by rounding: not determined
     scale = np.where(scale > 0, scale, 1)[..., None]
     scale = scale * np.swapaxes(scale, -1, -2)
     values, vectors = np.linalg.eigh(matrices / scale)

@@ -46,7 +46,7 @@ class ByView:
         no other can contradict, that of `alone`.
         """
         whole = self.information.sum(axis=0) + self.assumed
-        scale = np.sqrt(np.einsum("ii->i", whole))
+        scale = np.sqrt(np.maximum(np.einsum("ii->i", whole), 0))  # below 0 by rounding: the poses take all of it
         scale = np.where(scale > 0, scale, 1)
         values, vectors = np.linalg.eigh(whole / np.outer(scale, scale))
         known = values > UNKNOWN * len(values)

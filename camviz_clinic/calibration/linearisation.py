@@ -191,9 +191,9 @@ class Linearisation(Problem):
 
     @property
     def warp_covariance(self) -> Array | None:
-        """Of the board's two sagittas, (2, 2) in metres squared; None for a flat board."""
+        """Of the board's two sagittas, (2, 2) in metres squared, by the scatter of the views; None for a flat board."""
         place = self.warp_place
-        return None if place is None else self.covariance[place, place]
+        return None if place is None else self.clustered_covariance[place, place]
 
     @cached_property
     def pose_covariance(self) -> Array:

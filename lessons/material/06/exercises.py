@@ -192,7 +192,10 @@ def _focal_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         K, R = _K(rng), _turned(upright, place)
         yield float(rng.uniform(0.2, 5)) * (-1) ** place * _H(K, R, t), K[:2, 2]
     K = _K(rng) * [[1, 1, -1], [1, 1, -1], [1, 1, 1]]
-    yield _H(K, *_pose(rng)), K[:2, 2]
+    H = _H(K, *_pose(rng))
+    while not (_inverse_squares((_to_centre(K[:2, 2]) @ H).T) > 0).all():  # its rows, too, give numbers
+        H = _H(K, *_pose(rng))
+    yield H, K[:2, 2]
 
 
 FOCAL_LENGTHS = Exercise(

@@ -746,7 +746,8 @@ def _apart_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         xi, other = rng.permutation([rng.uniform(0.3, 0.8), rng.uniform(1.0, 1.8)]).tolist()
         yield rng.uniform(0.3, 1.3, shape), float(rng.uniform(200, 700)), xi, other
     yield np.append(0.0, rng.uniform(0.2, 1.2, 3)), float(rng.uniform(200, 700)), 0.0, float(rng.uniform(0.6, 1.4))
-    yield rng.uniform(1.6, 1.9, 4), float(rng.uniform(200, 700)), float(rng.uniform(0.6, 0.9)), 1.0  # from behind
+    # From behind; here the second radius is the larger one, in the case before the smaller.
+    yield rng.uniform(1.6, 1.9, 4), float(rng.uniform(200, 700)), 1.0, float(rng.uniform(0.6, 0.9))
 
 
 APART = Exercise(

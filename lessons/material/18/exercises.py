@@ -40,6 +40,7 @@ def _lines(rng: np.random.Generator) -> Iterator[Arguments]:
     step = 2.0 ** rng.integers(4, 7, 2)
     p, q = rng.uniform(-100, 100, (2, 2))
     yield a - p, a + 2 * p, a - q, a + q  # they meet between their ends
+    yield a + p, a + 3 * p, a + q, a + 2 * q  # beyond the ends of both, and neither is upright
     yield a, a + step, c, c + 2 * step  # parallel
     yield a, a + (0, 64), c, c + (37, 0)  # upright and level
     yield a, a + (0, 64), a + (32, 8), a + (32, 40)  # both upright
