@@ -114,12 +114,7 @@ def _written(each: FromEach, picked: int, yours: bool, x: float, y: float) -> st
 
 
 def _pair(values: Array) -> str:
-    fx, fy = map(_pixels, values)
+    """In pixels; a board parallel to the picture leaves some ten digits before the point."""
+    told = [f"{value:.1f}" if abs(value) < 1e5 else "over 100,000" for value in values]
+    fx, fy = (words if np.isfinite(value) else "none" for words, value in zip(told, values, strict=True))
     return true_minus(f"fx {fx}, fy {fy}")
-
-
-def _pixels(length: float) -> str:
-    """A board parallel to the picture leaves some ten digits before the point."""
-    if not np.isfinite(length):
-        return "none"
-    return f"{length:.1f}" if abs(length) < 1e5 else "over 100,000"

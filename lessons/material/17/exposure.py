@@ -24,7 +24,7 @@ from camviz.sensors import Sensor
 from camviz.sensors.common_random_numbers import Draw, exposed
 from camviz.views import garden
 from camviz.views.base import View, choice, positive, slider
-from camviz.views.yours import YOURS_HERE, is_unwritten, tried
+from camviz.views.yours import placeholder, tried
 
 FULL_WELL_E = 30_000.0
 READ_NOISE_E = 3.0
@@ -240,10 +240,8 @@ class ExposureView(View):
             values, problem = tried(self.yours, (r[::3], FOCAL_MM), r[::3])
             places = panel.place(np.stack([r[::3], np.clip(values, -1, 3)], axis=-1))
             points = svg.line(places, "orange") + svg.dots(places, "orange", 6)
-            if is_unwritten(problem):
-                points += svg.text(panel.place((0.6 * _CORNER_MM, 0.42)), YOURS_HERE, "note middle halo")
-            elif problem:
-                points += svg.paragraph((10, 20), problem, panel.width - 20, "note halo")
+            words = panel.place((0.4 * _CORNER_MM, 0.42))
+            points += svg.paragraph(words, placeholder(problem), 0.58 * panel.width, "note halo")
         entries = [("ink thick", "now"), ("blue dashed", "cos⁴"), ("purple dashed", "rim")]
         entries += [("orange thick", "yours")] if self.yours else []
         content = curves + points + plot.legend(panel, entries, "bottom left")
