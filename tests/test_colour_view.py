@@ -238,6 +238,9 @@ def test_where_a_function_is_awaited_the_right_pictures_stand_greyed(part):
     )
     assert right.shape == greyed.shape
     assert np.ptp(greyed.astype(int), axis=-1).mean() < 3 < np.ptp(right.astype(int), axis=-1).mean()
+    tiles = {tile.name: tile.body for tile in figure.tiles}
+    distances = {name: len(re.findall(r'class="tick" style="fill', tiles[name])) for name in ("chart", "your chart")}
+    assert distances == {"chart": 24, "your chart": 0}  # not the right ones, pale
 
 
 def tiles(**state):

@@ -1,5 +1,9 @@
 """The vanishing-point and the height visualizer: what they draw is what the house and its camera are."""
 
+import math
+import re
+from itertools import combinations
+
 import numpy as np
 import pytest
 
@@ -35,6 +39,16 @@ def test_a_dragged_end_moves_its_own_line_and_no_other(handle, moves):
         np.testing.assert_allclose(off, expected, atol=1e-9)
     by_key = np.subtract(moved.pressed(handle, "ArrowLeft").moved, moved.moved)
     np.testing.assert_allclose(by_key[int(handle[3:])], (-1, 0), atol=0.01)
+
+
+@pytest.mark.parametrize("aside", [-3.0, 0.0, 2.0])
+@pytest.mark.parametrize("turn_deg", [-25.0, 0.0, 30.0])
+def test_a_hand_can_take_each_end_although_two_lines_end_in_the_corner_of_both_walls(turn_deg, aside):
+    body = VanishingView(turn_deg=turn_deg, aside=aside).figure(draft=True).body
+    hands = re.findall(r'<g data-drag="end\d".*?<circle cx="([\d.-]+)" cy="([\d.-]+)" r="13"', body)
+    assert len(hands) in (4, 8)
+    between = [math.dist(map(float, a), map(float, b)) for a, b in combinations(hands, 2)]
+    assert min(between) > 8  # of 13 that each reaches
 
 
 def test_a_dragged_end_changes_the_focal_length_and_where_the_lines_meet():

@@ -194,7 +194,7 @@ class ColourView(View):
         """The chart by the reader's function, or the right one, greyed, or what is wrong."""
         (rgb, problem), panel, title = self.your_chart, self._chart_panel("your chart"), "With your function"
         if problem:
-            awaited = swatches.chart(panel, self.chart, self.shot.true_chart, self.errors, self.patch)
+            awaited = swatches.chart(panel, self.chart, self.shot.true_chart, None, self.patch)
             return without(panel, problem, title, (16, 30), awaited)
         shown = swatches.chart(panel, rgb, self.shot.true_chart, self._off(rgb), self.patch)
         return panel.show(shown, title=title) + self._key(panel, self._off(rgb))

@@ -17,8 +17,8 @@ from camviz.scenes.light import to_display
 _MARGIN = 0.04  # of a patch, in black between the patches
 
 
-def chart(panel: Panel, rgb: np.ndarray, true_xyz: np.ndarray, errors: np.ndarray, chosen: int) -> str:
-    """The chart's 24 patches: linear sRGB above left of each diagonal, the truth below right of it, ΔE on it."""
+def chart(panel: Panel, rgb: np.ndarray, true_xyz: np.ndarray, errors: np.ndarray | None, chosen: int) -> str:
+    """The chart's 24 patches: linear sRGB above left of each diagonal, the truth below right of it, ΔE if given."""
     estimates, truths = hexadecimal(rgb), hexadecimal(to_srgb(true_xyz))
     light = np.clip(rgb, 0, 1) @ (0.2126, 0.7152, 0.0722) > 0.179  # where black stands out more than white
     parts = [svg.rectangle(0, 0, panel.width, panel.height, "black", style="fill:#111")]
@@ -30,7 +30,8 @@ def chart(panel: Panel, rgb: np.ndarray, true_xyz: np.ndarray, errors: np.ndarra
         corner = [(left, top), (right, top), (left, bottom)]
         parts.append(svg.polygon(corner, "patch", style=f"fill:{estimate}"))
         ink = "#000" if light[i] else "#fff"
-        parts.append(svg.text((left + 5, top + 16), f"{errors[i]:.1f}", "tick", style=f"fill:{ink}"))
+        if errors is not None:
+            parts.append(svg.text((left + 5, top + 16), f"{errors[i]:.1f}", "tick", style=f"fill:{ink}"))
     row, column = divmod(chosen, 6)
     corners = panel.place([(column, row), (column + 1, row), (column + 1, row + 1), (column, row + 1)])
     frame = [("#fff", 5), ("#111", 2)]  # stands out from any colour

@@ -167,7 +167,7 @@ class SharpnessView(View):
 
     @cached_property
     def _layout(self) -> dict[str, Cell]:
-        high = {"picture": 328, "curves": 406 + 54 * bool(self.yours), "numbers": 356}
+        high = {"picture": 328, "curves": 406, "numbers": 356}
         return shortened(rows((max(high.values()), {name: w for name, w in _WIDE.items() if self._has(name)})), **high)
 
     def _picture_panel(self, left: float) -> str:
@@ -178,15 +178,16 @@ class SharpnessView(View):
 
     def _curves_panel(self, left: float) -> str:
         """The curves, and below them what is to be said of the reader's function."""
-        panel = plot.plot_panel("curves", left + 60, 34, 270, 252, (0, TOP_PER_MM), (0, 1.08))
+        deep = 198 if self.yours else 252
+        panel = plot.plot_panel("curves", left + 60, 34, 270, deep, (0, TOP_PER_MM), (0, 1.08))
         f = np.linspace(0, TOP_PER_MM, 131)
         curves = self._colours(panel, f) if self.coloured else self._causes(panel, f)
         yours, problem = self._your_points(panel)
         nyquist = plot.upright(panel, self.nyquist_per_mm, "muted dotted")
         content = nyquist + curves + self._half(panel) + yours
         names = "frequency (cycles per mm)", "MTF"
-        drawn = plot.plotted(panel, content, *names, title="Contrast that is left") + self._legend(left)
-        return drawn + svg.paragraph((left + 40, 416), placeholder(problem), 290)
+        drawn = plot.plotted(panel, content, *names, title="Contrast that is left")
+        return drawn + self._legend(left, deep + 94) + svg.paragraph((left + 40, 362), placeholder(problem), 290)
 
     def _causes(self, panel: Panel, f: np.ndarray) -> str:
         """What each cause alone leaves, and all of them."""
@@ -215,7 +216,7 @@ class SharpnessView(View):
         points = panel.place(np.stack([f, np.clip(values, -1, 2)], axis=-1))
         return svg.line(points, "orange") + svg.dots(points, "orange", 6), problem
 
-    def _legend(self, left: float) -> str:
+    def _legend(self, left: float, top: float) -> str:
         """Below the curves, where it stands in no curve's way."""
         entries = [("ink thick", "all together"), ("blue dashed", "diffraction")]
         entries += [("purple dashed", "defocus"), ("green dashed", "pixel")]
@@ -224,7 +225,7 @@ class SharpnessView(View):
         entries += [("muted dotted", "Nyquist"), *([("orange thick", "yours")] if self.yours else [])]
         drawn = ""
         for i, (class_, words) in enumerate(entries):
-            x, y = left + 40 + 150 * (i % 2), 346 + 20 * (i // 2)
+            x, y = left + 40 + 150 * (i % 2), top + 20 * (i // 2)
             drawn += svg.line([(x, y), (x + 20, y)], class_) + svg.text((x + 26, y + 4), words, "note")
         return drawn
 

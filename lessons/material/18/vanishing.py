@@ -188,9 +188,18 @@ class VanishingView(View):
             lefts.append(side < 0)
         return drawn, any(lefts)
 
+    @cached_property
+    def _grips(self) -> dict[str, Array]:
+        """Pixels near the ends of the lines: where two lines end in one corner, a hand must tell them apart."""
+        grips = {}
+        for name, both in self.lines.items():
+            inwards = both[:, ::-1] - both
+            grips[name] = both + inwards * 30 / np.maximum(np.linalg.norm(inwards, axis=-1, keepdims=True), 240)
+        return grips
+
     def _handle(self, index: int) -> str:
         name, colour = ("x", "blue") if index < 4 else ("z", "purple")
-        at = PAPER.place(self.lines[name].reshape(4, 2)[index % 4])
+        at = PAPER.place(self._grips[name].reshape(4, 2)[index % 4])
         if not np.isfinite(at).all():
             return ""
         hand = svg.element("circle", cx=float(at[0]), cy=float(at[1]), r=13, fill_opacity=0, class_="card")
