@@ -82,6 +82,13 @@ def test_a_tile_that_a_telephone_scrolls_takes_the_next_line_elsewhere_before_it
     assert "1 max(432px," in narrow
 
 
+def test_keys_scroll_what_is_scrolled_on_a_telephone_and_stop_at_nothing_else():
+    """WCAG 2.1.1; a tab stop at a tile that never scrolls is one too many."""
+    for width, stops in ((SCROLLED, 0), (SCROLLED + 1, 1)):
+        tile = Tile("wide", (0, 0, width, 300), "")
+        assert [html.count('tabindex="0"') for html in (tile.html(), tile.image("a.png", "A line"))] == [stops, stops]
+
+
 def test_a_tick_gives_way_to_a_title_and_a_label_moves_beside_another():
     title, tick = svg.text((10, 20), "Title", "title"), svg.text((12, 22), "0.5", "tick")
     assert uncluttered(title + tick, DESK) == title

@@ -24,6 +24,7 @@ from pygments.formatters import HtmlFormatter
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "tools/website"), str(ROOT / "tools/docs")]
 
+import deeper  # noqa: E402
 import docstrings  # noqa: E402
 import engineers  # noqa: E402
 import mistakes  # noqa: E402
@@ -157,6 +158,35 @@ def test_a_prediction_and_the_last_text_before_a_pane_lead_to_it():
 
 def test_sentences_without_a_pane_and_a_pane_without_sentences_have_the_whole_width():
     assert grouped("# One|a", "x", "b", "x", "P", "x") == "# One a x b x P x"
+
+
+def test_a_deeper_sections_minutes_stand_with_its_heading_above_its_pane():
+    begins = "### Deeper: a|*About 5 minutes. Asks for: section 1.*"
+    assert grouped(f"{begins}|b", "P") == f"{begins} [ b P ]".replace("|", "\n\n")
+
+
+def test_a_deeper_section_is_folded_below_its_minutes_with_the_headings_in_it():
+    def section(title, *parts):
+        return nodes.section("", nodes.title(text=title), *parts)
+
+    def said(text):
+        return nodes.paragraph(text=text)
+
+    core, inner = section("1 · Core", said("core")), section("Exercise 3", said("task"))
+    page = section("Lesson", core, section("Deeper: a", said("About 5 minutes."), said("first"), inner))
+    deeper.fold(page)
+    assert [one.tagname for one in page.children[1:]] == ["section", "section"]
+    assert [one.astext() for one in core.children] == ["1 · Core", "core"]
+    title, minutes, opens, first, within, closes = page.children[2].children
+    assert (title.astext(), minutes.astext(), first.astext()) == ("Deeper: a", "About 5 minutes.", "first")
+    assert (opens.astext()[:8], within, closes.astext()) == ("<details", inner, "</details>")
+
+
+def test_each_column_of_a_table_has_a_head():
+    """An empty one is read out as nothing (axe: empty-table-header)."""
+    for path in (ROOT / "docs").rglob("*.md"):
+        heads = re.findall(r"^(\|.*\|)\n\|[ :]*---", path.read_text(encoding="utf-8"), re.MULTILINE)
+        assert [head for head in heads if re.search(r"\| *\|", head)] == [], path
 
 
 def test_a_report_of_the_gallery_has_its_picture_and_no_other_page_changes():

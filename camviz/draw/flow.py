@@ -18,6 +18,7 @@ _PRESENTED = "var(--camviz-scale,1)*"  # how much larger a presentation shows ev
 STILL = 1.2  # picture units that make a CSS pixel in a still, which is drawn once for columns of 650 to 1000 pixels
 SCROLLED = 620  # picture units: a wider tile is scrolled sideways on a telephone
 _SCROLLED_PX = 560  # how wide it is shown there
+_KEYS = 'tabindex="0"'  # so that keys scroll it, too
 
 Cell = tuple[float, float, float, float]
 """Left, top, width and height, in picture units."""
@@ -77,10 +78,10 @@ class Tile:
         if self.words:
             name = escape(self.name)
             return f'<div class="camviz-tile" data-tile="{name}" style="flex:1 1 100%">{self.sentences}</div>'
-        kind = "camviz-tile camviz-scrolled" if self.cell[2] > SCROLLED else "camviz-tile"
+        kind = f'class="camviz-tile camviz-scrolled" {_KEYS}' if self.cell[2] > SCROLLED else 'class="camviz-tile"'
         name = escape(self.name)
         fold = f'<button type="button" class="camviz-fold" aria-expanded="true">{name}</button>'
-        return f'<div class="{kind}" data-tile="{name}" style="{self.style(_PRESENTED)}">{fold}{self._svg(unit)}</div>'
+        return f'<div {kind} data-tile="{name}" style="{self.style(_PRESENTED)}">{fold}{self._svg(unit)}</div>'
 
     def image(self, source: str, words: str, *, later: bool = False) -> str:
         """The tile as an image among others that flow on a page without a style sheet; `words` say what it shows.
@@ -92,7 +93,7 @@ class Tile:
         if self.cell[2] <= SCROLLED:
             return f'<img alt="{escape(words)}"{kept} style="{self.style()}{tall}" src="{source}">'
         image = f'<img alt="{escape(words)}"{kept} style="width:100%;min-width:{_SCROLLED_PX}px{tall}" src="{source}">'
-        return f'<div style="{self.style()};overflow-x:auto">{image}</div>'
+        return f'<div {_KEYS} style="{self.style()};overflow-x:auto">{image}</div>'
 
     @property
     def sentences(self) -> str:

@@ -12,7 +12,6 @@ from PIL import Image
 from camviz.draw.picture import Picture
 
 QUALITY = 85  # of WebP, for photographs; maps and masks (PNG) keep every pixel
-_SCROLLED = 'class="camviz-tile camviz-scrolled"'
 _FITTED = re.compile(r'class="camviz-svg camviz-fitted"[^>]* viewBox="\S+ \S+ (\S+) (\S+)"')
 
 
@@ -27,7 +26,6 @@ def embedded(picture: Picture) -> str:
     """
     photographs = {name: webp(data, QUALITY) for name, data in picture.photographs.items()}
     markup = replace(picture, photographs=photographs).embedded()
-    markup = markup.replace(_SCROLLED, f'{_SCROLLED} tabindex="0"')  # for those who scroll by keys
     return _FITTED.sub(r'\g<0> style="aspect-ratio:\1/\2"', markup)
 
 

@@ -12,6 +12,9 @@ ROOT = Path(__file__).resolve().parents[2]
 SITE = Path(os.environ.get("CAMVIZ_SITE", ROOT / "build/site"))
 LESSONS = sorted(path.stem for path in (ROOT / "lessons").glob("*.ipynb"))
 
+UNFOLDED = "() => document.querySelectorAll('.camviz-deeper').forEach((one) => { one.open = true; })"
+"""Opens all deeper sections of a page."""
+
 
 @contextmanager
 def served() -> Iterator[str]:

@@ -325,6 +325,24 @@ def test_at_home_a_lessons_page_asks_twice_and_then_says_why(reading):
     assert reading.do("close at home")["states"][NAME] == "voted twice"
 
 
+def test_at_home_the_folded_sections_open_in_which_something_is_asked(browser, tmp_path):
+    with camviz_class(tmp_path, "02", "--site", str(SITE)) as (_, port, said):
+        room = Class(browser, port, said)
+        page = room.page("site/lessons/02_lenses.html", LAPTOP)
+        folded = page.locator(".camviz-deeper", has=page.locator(".camviz-question"))
+        assert folded.count() == 1
+        assert not folded.locator(".camviz-question").is_visible()
+        joins(page, room.word)
+        room.do("open at home")
+        expect(folded.locator(".camviz-question")).to_be_visible()
+        folded.get_by_text("Hide this section").click()
+        room.do("close at home")
+        expect(page.locator(".camviz-class .news")).not_to_contain_text("open at home")
+        assert not folded.locator(".camviz-question").is_visible()
+        page.close()
+        assert [one for one in room.wrong if "[PST]" not in one] == []
+
+
 def test_the_published_page_offers_no_room(browser):
     """The same files, from anybody else's server."""
     page = new_page(browser)

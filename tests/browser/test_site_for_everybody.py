@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import pytest
 from axe_playwright_python.base import AXE_SCRIPT
 from bs4 import BeautifulSoup, SoupStrainer
-from built_site import LESSONS, SITE, served
+from built_site import LESSONS, SITE, UNFOLDED, served
 from laboratory import new_page
 from PIL import Image
 from playwright.sync_api import Browser, Page
@@ -21,6 +21,8 @@ AXE = """async () => {
   const { violations } = await axe.run(document, { resultTypes: ["violations"], preload: false });
   return violations.flatMap(({ id, nodes }) => nodes.map(({ html }) => `${id}: ${html.slice(0, 160)}`));
 }"""
+SCROLLED_BY_KEYS = """() => [...document.querySelectorAll("pre")]
+  .every((one) => one.scrollWidth <= one.clientWidth || one.tabIndex === 0)"""
 JOINED = """async (ways) => {
   const texts = await Promise.all(ways.map(async (way) => (await fetch(way)).text()));
   const articles = texts.map((text) => new DOMParser().parseFromString(text, "text/html").querySelector(".bd-article"));
@@ -58,6 +60,8 @@ def ways(generated: bool) -> list[str]:
 
 
 def found_by_axe(page: Page) -> list[str]:
+    page.evaluate(UNFOLDED)
+    page.wait_for_function(SCROLLED_BY_KEYS)
     page.evaluate(AXE_SCRIPT)
     return page.evaluate(AXE)
 
@@ -240,6 +244,7 @@ def pane_heights(browser: Browser, lesson: str, width: int, *, live: bool) -> li
     if not live:
         page.route("**/_recordings/*.js", lambda route: route.abort())
     page.goto(lesson)
+    page.evaluate(UNFOLDED)
     heights = []
     for pane in page.locator(".camviz-recorded:visible").all():
         pane.scroll_into_view_if_needed()

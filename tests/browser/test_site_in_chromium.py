@@ -10,7 +10,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import pytest
-from built_site import LESSONS, SITE, served
+from built_site import LESSONS, SITE, UNFOLDED, served
 from laboratory import new_page
 from playwright.sync_api import Browser, Locator, Page
 
@@ -96,7 +96,9 @@ class Watched:
         self.page.on("response", lambda got: self.complaints.append(got.url) if got.status >= 400 else None)
 
     def open(self, way: str) -> Page:
+        """The page with all its sections open."""
         self.page.goto(f"{self.address}/{way}.html")
+        self.page.evaluate(UNFOLDED)
         return self.page
 
     @property
@@ -276,6 +278,36 @@ def test_without_scripts_a_lesson_has_stills_and_folded_replies(browser: Browser
     reply.locator("summary").click()
     assert reply.locator("blockquote").is_visible()
     page.close()
+
+
+@pytest.mark.parametrize("scripts", [True, False])
+def test_a_deeper_section_is_folded_until_it_is_opened(browser: Browser, address: str, scripts: bool) -> None:
+    page = new_page(browser, java_script_enabled=scripts)
+    page.goto(f"{address}/lessons/05_distortion.html")
+    heading = page.locator("section", has=page.locator(":scope > h3", has_text="Deeper: ")).first
+    words = heading.locator(":scope > .camviz-deeper > p").first
+    assert heading.locator(":scope > p").inner_text().startswith("About ")
+    assert not words.is_visible()
+    heading.get_by_text("Show this section").click()
+    assert words.is_visible()
+    heading.get_by_text("Hide this section").click()
+    assert not words.is_visible()
+    page.close()
+
+
+def test_a_link_into_a_deeper_section_and_paper_open_it(watched: Watched) -> None:
+    page = watched.page
+    page.goto(f"{watched.address}/lessons/05_distortion.html")
+    folds = page.locator(".camviz-deeper")
+    inner = folds.locator("section[id]").last.get_attribute("id")
+    page.goto(f"{watched.address}/lessons/05_distortion.html#{inner}")
+    assert 0 <= page.locator(f"#{inner}").bounding_box()["y"] < 300
+    own = folds.first.locator("..").get_attribute("id")
+    page.goto(f"{watched.address}/lessons/05_distortion.html#{own}")
+    opened = folds.evaluate_all("all => all.map((one) => one.open)")
+    assert (opened[0], opened.count(True)) == (True, 2)
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert folds.evaluate_all("all => all.every((one) => one.open)")
 
 
 def test_a_printed_lesson_has_pictures_and_no_solution(watched: Watched) -> None:

@@ -15,7 +15,8 @@ Kind = Literal["pane", "said", "asked", "other"]
 """A pane; sentences; a prediction, which belongs to the pane after it; and what ends a group, as a heading does."""
 
 _OPEN, _CLOSE = f'<div class="{BESIDE}">', "</div>"
-_HEADINGS = re.compile(r"^#.*(?:\n(?:.*\n)*#.*)?$", re.MULTILINE)  # from the first heading to the last
+_HEADINGS = re.compile(r"^#.*(?:\n(?:.*\n)*#.*)?(?:\n\n\*About \d+ minutes.*\*)?$", re.MULTILINE)
+"""From the first heading to the last, with the line of minutes below a deeper section's."""
 
 
 class Part(NamedTuple):

@@ -23,6 +23,7 @@ extensions = [
     "sphinx.ext.autosummary",
     "docstrings",
     "mathml",
+    "deeper",
 ]
 templates_path = ["templates"]
 exclude_patterns = ["_static"]

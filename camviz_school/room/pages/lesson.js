@@ -13,6 +13,7 @@ const room = new URL("../", import.meta.url).href;
 const news = element("p", { role: "status", class: "news" }), body = element("div");
 let membership = recalled(), latest = null, following = 0;
 const pending = {}; // by question, this student's choices, until the page may keep them
+const unfolded = new Set(); // questions whose folded section was opened for them
 const problems = {}; // by question, why the last choice was not counted
 
 const say = (...words) => news.replaceChildren(...words);
@@ -97,12 +98,22 @@ function show(told) {
 function point(told) {
   const open = (told.questions ?? [told.question]).filter((one) => one?.open);
   const here = open.find(({ name }) => names.includes(name));
+  unfold(open);
   const link = (words, href) => element("a", { href }, words);
   if (told.at_home) say("The questions are open at home. Answer each twice; then you read why.");
   else if (here) say("The class votes on a question of this page: ", link("go to the question", `#${place(here.name)}`), ".");
   else if (open.length) say("The class votes on a question that is not on this page: ", link("go there", told.read ? room + told.read : room), ".");
   else if (told.question) say(link(words(told.question), names.includes(told.question.name) ? `#${place(told.question.name)}` : room), ".");
   else say("You are in. The next question comes when the teacher asks it.");
+}
+
+// A folded section in which something is asked opens once; who closes it again leaves it closed.
+function unfold(questions) {
+  for (const { name } of questions.filter((one) => !unfolded.has(one.name))) {
+    const fold = asked.find((one) => one.names.includes(name))?.place.closest("details.camviz-deeper");
+    unfolded.add(name);
+    if (fold) fold.open = true;
+  }
 }
 
 function words({ revealed, rounds }) {

@@ -276,9 +276,26 @@ function mistakes() {
   }
 }
 
+// A link into a deeper section, or to its heading, opens it; paper has them all. What has opened is told as a resize: the
+// theme measures then which listings scroll, and lets keys reach these.
+function deeper() {
+  const folded = [...document.querySelectorAll("details.camviz-deeper")];
+  folded.forEach((one) => one.addEventListener("toggle", () => dispatchEvent(new Event("resize"))));
+  const arrive = () => {
+    const target = document.getElementById(location.hash.slice(1));
+    const closed = folded.filter((one) => !one.open && (one.contains(target) || one.parentElement === target));
+    closed.forEach((one) => { one.open = true; });
+    if (closed.length) target.scrollIntoView();
+  };
+  addEventListener("hashchange", arrive);
+  addEventListener("beforeprint", () => folded.forEach((one) => { one.open = true; }));
+  arrive();
+}
+
 questions();
 panes();
 code();
+deeper();
 mistakes();
 progress();
 terms();
