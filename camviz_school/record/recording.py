@@ -331,13 +331,11 @@ class _Recorder:
 
 def _room(controls: Sequence[str]) -> str:
     """The controls, drawn where the live ones and their buttons will be (explorer.css), so that nothing jumps."""
-    two = "repeat(auto-fill,minmax(min(max(290px,34%),100%),1fr))"
-    columns = "minmax(min(320px,100%),792px)" if len(controls) <= 3 else two
     font = "font:normal 13px system-ui,sans-serif"
     row = "height:26px;display:flex;gap:8px;align-items:center"
     track = '<s style="flex:1;height:5px;border-radius:3px;background:#8b94a3"></s>'
     rows = "".join(f'<i style="{row};{font}">{escape(label)}{track}</i>' for label in controls)
-    grid = f"display:grid;grid-template-columns:{columns};gap:4px 22px;padding:6px 2px 8px"
+    grid = "display:grid;grid-template-columns:minmax(min(320px,100%),792px);gap:4px 22px;padding:6px 2px 8px"
     return (
         f'<div aria-hidden="true" style="{grid}">'
         f'{rows}<i class="camviz-foot-room" style="height:24px;grid-column:1/-1;font-size:13px"></i></div>'

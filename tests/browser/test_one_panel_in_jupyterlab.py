@@ -56,11 +56,21 @@ def test_the_picture_begins_on_the_first_screen_and_fits_a_small_one_with_its_co
     assert found.evaluate("root => hands.controls(root)") == ["k1"]
 
 
-def test_a_slider_is_long_enough_for_its_steps(lesson):
+def test_each_control_has_a_row_and_a_slider_is_long_enough_for_its_steps(lesson):
     many = lesson.page.query_selector_all(".camviz-explorer")
-    assert max(len(one.query_selector_all("[data-control]")) for one in many) > 3  # in two columns; else one row each
+    rows = [[one.bounding_box()["y"] for one in each.query_selector_all("[data-control]")] for each in many]
+    assert max(map(len, rows)) > 3
+    assert all(len(set(each)) == len(each) for each in rows)
     lengths = [track.bounding_box()["width"] for one in many for track in one.query_selector_all("input[type=range]")]
-    assert min(lengths) > 180
+    assert min(lengths) > 400
+
+
+def test_controls_that_stay_in_sight_leave_two_thirds_of_a_small_screen_at_200_percent_to_the_picture(lesson):
+    controls = [one.query_selector(".camviz-controls") for one in lesson.shown_in(683, 384)]
+    stay = [one for one in controls if "camviz-sticky" in one.get_attribute("class")]
+    assert 0 < len(stay) < len(controls)
+    assert max(one.bounding_box()["height"] for one in stay) < 384 / 3
+    lesson.page.set_viewport_size({"width": 1366, "height": 768})
 
 
 @pytest.mark.parametrize("width", [375, 1366])
