@@ -28,6 +28,9 @@ PICTURE = ".camviz-recorded, .cell_output .camviz-figure, .cell_output img"  # a
 SCRIPT = re.compile(r'<script type="application/json">.*?</script>', re.DOTALL)
 ADDRESS = re.compile(r'<[a-z][^<>]*?\s(?:href|src)="([^"]*)"')
 LOADED = re.compile(r'<(?:script|img|iframe|link(?! rel="canonical"))[^<>]*?\s(?:src|href)="([^"]*)"')
+CUT = """() => [...document.querySelectorAll("math:not(.formula math)")].filter((one) => one.checkVisibility()
+  && one.getBoundingClientRect().right > one.closest("p, li, td, th, summary, div").getBoundingClientRect().right + 1)
+  .map((one) => one.textContent)"""
 TO_BOTH_ENDS = """async () => {
   const wrong = [], panes = [...document.querySelectorAll(".camviz-recorded")].filter((one) => one.checkVisibility());
   let changed = 0;
@@ -183,11 +186,12 @@ def test_a_lesson_begins_with_its_picture_and_one_switch_shows_the_code(browser:
     assert watched.complaints == []
 
 
-def test_a_phone_scrolls_no_page_sideways(browser: Browser, address: str) -> None:
+def test_a_phone_scrolls_no_page_sideways_and_cuts_no_formula_in_a_line(browser: Browser, address: str) -> None:
     phone = Watched(browser, address, viewport={"width": 375, "height": 812}, has_touch=True)
     for way in (*READ, *(f"lessons/{name}" for name in LESSONS)):
         page = phone.open(way)
         assert page.evaluate("() => document.documentElement.scrollWidth") <= 375, way
+        assert page.evaluate(CUT) == [], way
     phone.page.close()
 
 

@@ -356,10 +356,10 @@ def test_the_formulas_of_the_smaller_terms_are_opencv_s(says, terms):
     r2 = x * x + y * y
     k4, k5, k6, s1, s2, s3, s4 = 0.2, -0.1, 0.3, 0.02, -0.03, 0.01, 0.05
     if terms == "rational":
-        says("The factor becomes $(1 + k_1 r^2 + k_2 r^4 + k_3 r^6)/(1 + k_4 r^2 + k_5 r^4 + k_6 r^6)$.")
+        says("the factor is divided by $1 + k_4 r^2 + k_5 r^4 + k_6 r^6$")
         coefficients, expected = (0, 0, 0, 0, 0, k4, k5, k6), np.array([x, y]) / (1 + k4 * r2 + k5 * r2**2 + k6 * r2**3)
     else:
-        says("thin prism: elements that are tilted a little.")
+        says("add $s_1 r^2 + s_2 r^4$ to $x_d$ and $s_3 r^2 + s_4 r^4$ to $y_d$.")
         coefficients = (*[0] * 8, s1, s2, s3, s4)
         expected = np.array([x + s1 * r2 + s2 * r2**2, y + s3 * r2 + s4 * r2**2])
     opencv = cv2.projectPoints(np.array([[x, y, 1.0]]), np.zeros(3), np.zeros(3), np.eye(3), np.array(coefficients))[0]
