@@ -106,6 +106,16 @@ def test_a_divided_lesson_follows_the_pattern(number):
     assert core_rules.complaints(EVERY[number], number) == []
 
 
+@pytest.mark.parametrize("number", LAYERED)
+def test_what_stands_below_the_core_is_in_a_deeper_section(number):
+    """The site folds these sections; a heading of their rank would end the one above it."""
+    cells = EVERY[number].cells[len(minutes.core(EVERY[number])) :]
+    text = "\n\n".join(cell.source for cell in cells if cell.cell_type == "markdown")
+    first, *others = re.findall(r"^#{1,3} .*", text, re.MULTILINE)
+    assert first == "## Going deeper"
+    assert [heading for heading in others if not heading.startswith("### Deeper: ")] == []
+
+
 def code_of(cells):
     """The code of cells as Python reads it, without `%magic` lines."""
     sources = [cell.source for cell in cells if cell.cell_type == "code"]
