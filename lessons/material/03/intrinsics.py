@@ -14,7 +14,7 @@ import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
-from camviz.draw.flow import WIDTH, Cell, rows
+from camviz.draw.flow import WIDTH, Cell, rows, shortened
 from camviz.draw.items import closed
 from camviz.draw.matrix import intrinsic_matrix
 from camviz.draw.panel import Panel, image_in, placed_image
@@ -137,7 +137,7 @@ class IntrinsicsView(CameraMatrix):
             return rows((_ALONE, {"picture": min(_MOST_ACROSS, round((_ALONE - 44) * self.width / self.height + 20))}))
         if (len(main), len(aside)) in _ONE_ROW:
             height, widths = _ONE_ROW[len(main), len(aside)]
-            return rows((height, dict(zip([*main, *aside], widths, strict=True))))
+            return shortened(rows((height, dict(zip([*main, *aside], widths, strict=True)))), K=310, numbers=230)
         height, widths = _TWO_ROWS[len(main)]
         tiles = [name for name in _SHARES if self._has("K" if name == _AFTER else name)]
         whole = sum(_SHARES[name] for name in tiles)
