@@ -22,7 +22,6 @@ pytestmark = pytest.mark.browser
 
 HANDS = (Path(__file__).with_name("hands.js")).read_text(encoding="utf-8")
 REPORTS = SITE / "engineers/reports"  # each a whole page in one file, as camviz inspect writes it
-CORES = [name for name in LESSONS if "01" <= name[:2] <= "09"]
 READ = ("index", "learn", "search", "docs/clinic", "about", "docs/glossary", "api/index", "lessons/05_distortion")
 PICTURE = ".camviz-recorded, .cell_output .camviz-figure, .cell_output img"  # a pane, or its still if not recorded
 SCRIPT = re.compile(r'<script type="application/json">.*?</script>', re.DOTALL)
@@ -167,7 +166,7 @@ def first_picture(place: Locator) -> str:
 def test_a_lesson_begins_with_its_picture_and_one_switch_shows_the_code(browser: Browser, address: str, size) -> None:
     """Nothing to install, no import and no fold stands above the first picture, which begins on the first screen."""
     watched = Watched(browser, address, viewport={"width": size[0], "height": size[1]})
-    for name in CORES:
+    for name in LESSONS:
         page = watched.open(f"lessons/{name}")
         assert page.locator(PICTURE).first.bounding_box()["y"] < size[1], name
     page = watched.open("lessons/05_distortion")
