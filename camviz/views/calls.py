@@ -11,12 +11,12 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator
 from types import ModuleType
-from typing import Any
+from typing import Any, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from camviz.views.patience import LIMIT_S, TimeIsUp
+from camviz.views.patience import LIMIT_S, TimeIsUp, is_debugging
 
 Array = NDArray[np.float64]
 """Numbers."""
@@ -32,14 +32,31 @@ SHARED: tuple[ModuleType, ...] = (builtins, math, np, np.linalg, np.random)
 
 @contextlib.contextmanager
 def contained(output: io.StringIO) -> Iterator[None]:
-    """What is called here prints into `output`, and what it replaces in the modules everybody uses is put back."""
+    """What is called here prints into `output`, and what it replaces in the modules everybody uses is put back.
+
+    A debugger that is opened here prints on the screen.
+    """
     before = [(module.__dict__, module.__dict__.copy()) for module in SHARED]
+    printed = _Captured(output, sys.stdout)
     try:
-        with contextlib.redirect_stdout(output), contextlib.redirect_stderr(sys.stderr), quiet():
+        with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(sys.stderr), quiet():
             yield
     finally:
         for names, kept in before:  # without a builtin function, for those may be among what was replaced
             names.update(kept)
+
+
+class _Captured(io.TextIOBase):
+    """A stdout that writes into `output`, and on `screen` what a debugger prints."""
+
+    def __init__(self, output: io.StringIO, screen: TextIO) -> None:
+        self._output, self._screen = output, screen
+
+    def write(self, text: str) -> int:
+        return (self._screen if is_debugging(sys._getframe()) else self._output).write(text)
+
+    def flush(self) -> None:
+        self._screen.flush()
 
 
 @contextlib.contextmanager

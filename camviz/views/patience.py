@@ -1,15 +1,10 @@
-"""A time limit for what a reader wrote: what does not return is stopped, and the kernel lives.
+"""A time limit for a reader's function: a call that does not return is stopped, and the kernel lives.
 
-The function runs in the thread that calls it, so that ■, NumPy and OpenCV take it for any other code. A second thread
-waits beside it, and is gone when the call ends. When time is up it raises a `TimeIsUp` in the first thread that
-raises the next one as soon as it is caught: loops that catch Exception do not hold it, nor do those that catch
-BaseException. A main thread that waits (`time.sleep`, a lock) is woken by the signal that Ctrl-C sends.
+In the main thread an interval timer's signal raises `TimeIsUp`, which also ends `time.sleep`. In other threads, and on
+Windows, a second thread raises it. Time in a debugger does not count.
 
-What cannot be stopped is one single call of C code that does not return, such as the product of two enormous matrices
-or `sum(itertools.count())`: the function is stopped when that call returns, and until then only a restart of the kernel
-helps. A call that never lets go of Python's lock (`re` on a bad pattern, huge integers) holds up the watching thread,
-too; ■ ends some of these. Outside the main thread, where JupyterLab has a view's controls answered, nothing wakes
-`time.sleep`, and ■ is not heard.
+Not stopped: one call of C code that does not return, `time.sleep` outside the main thread, and a loop that catches
+BaseException for ever. These need a restart of the kernel.
 """
 
 from __future__ import annotations
@@ -20,136 +15,115 @@ import sys
 import threading
 from collections.abc import Callable
 from contextvars import copy_context
-from functools import partial
+from types import FrameType
 from typing import Any, TypeVar
 
 T = TypeVar("T")
 
 LIMIT_S = 10.0
-"""What all calls of one check, or one call for a picture, may take together."""
+"""The time that all calls of one check, or one call for a picture, may take together."""
 
 NOTICE_S = 2.0
-"""After this the reader is told that the function still runs."""
+"""The time after which the reader is told that the function still runs."""
 
-_AGAIN_S = 0.05
-_WAKE_EVERY = 4  # rounds
-
-_raise_in = ctypes.pythonapi.PyThreadState_SetAsyncExc
-_raise_in.argtypes, _raise_in.restype = (ctypes.c_ulong, ctypes.py_object), None
-_NOTHING = ctypes.py_object()  # takes back what has not been raised yet
+_DEBUGGERS = ("bdb", "pydevd")  # the modules in which pdb, IPython's and JupyterLab's debugger wait
 
 notices: list[Callable[[str], bool]] = []
-"""Who shows a notice where no cell prints, such as a widget: each says whether it did."""
+"""Functions that show a notice where no cell prints, such as a widget; each returns whether it did."""
 
 
 class TimeIsUp(BaseException):
-    """Raised in a call that has taken too long. No Exception, for a loop may catch those."""
-
-
-def _again(thread: int | None) -> type[TimeIsUp]:
-    """A TimeIsUp that is raised again when it is made, where the thread then is: in whatever `except` caught it.
-
-    Its `__init__` is a C function, within which Python does not yet look for what is to be raised.
-    """
-    again = type("TimeIsUp", (TimeIsUp,), {})
-    again.__init__ = staticmethod(partial(_raise_in, thread, again))  # type: ignore[misc]
-    return again
+    """Raised in a call that takes too long. Not an Exception, because loops catch those."""
 
 
 class Patience:
-    """The time that several calls have together, and the thread that watches them.
+    """A time limit that several calls share.
 
     >>> with Patience() as patience:
     ...     patience.call(max, 1, 2)
     2
 
-    What it tells the reader goes where `print` goes at its making.
+    Its notice is printed where `print` goes when it is made.
     """
 
     def __init__(self) -> None:
         self._screen = sys.stdout
-        self._here = threading.get_ident()
-        self._inside = self._expired = False
-        self._turn = threading.Lock()
+        self._thread = threading.get_ident()
+        self._main = threading.current_thread() is threading.main_thread()
+        self._inside = self._noticed = self._expired = False
+        self._lock = threading.Lock()  # the second thread interrupts only what is inside a call
         self._over = threading.Event()
-        run = copy_context().run  # to print where the caller prints
-        self._thread = threading.Thread(target=run, args=(self._watch, LIMIT_S, NOTICE_S), daemon=True)
 
     def __enter__(self) -> Patience:
-        self._thread.start()
+        if self._main and hasattr(signal, "setitimer"):
+            self._handler_before = signal.signal(signal.SIGALRM, self._on_alarm)
+            signal.setitimer(signal.ITIMER_REAL, NOTICE_S, LIMIT_S - NOTICE_S)
+        else:
+            run = copy_context().run  # to print where the caller prints
+            threading.Thread(target=run, args=(self._watch,), daemon=True).start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._over.set()
-        self._thread.join()
+        if self._main and hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, 0)
+            signal.signal(signal.SIGALRM, self._handler_before)
 
     def call(self, function: Callable[..., T], *arguments: Any) -> T:
-        """What the function returns. Raises what it raises, and TimeIsUp where it had to be stopped."""
+        """Return what the function returns. Raises what it raises, and TimeIsUp where it was stopped."""
         if self._expired:
             raise TimeIsUp
-        here = self._here
-        raised: BaseException | None = None
+        self._inside = True
         try:
-            self._inside = True
-            result = function(*arguments)
-            self._inside = False
-        except BaseException as error:
-            self._inside = False
-            _raise_in(here, _NOTHING)  # first of all: what waits is raised at the next call or loop
-            raised = error
-        try:  # one more and the wakening that came with it may be on their way: they end here
-            try:
-                self._leave()
-            except (TimeIsUp, KeyboardInterrupt) as late:
-                _raise_in(here, _NOTHING)
-                raised = raised or late
-                self._leave()
-        except (TimeIsUp, KeyboardInterrupt):
-            _raise_in(here, _NOTHING)
-            self._leave()
-        if self._expired:  # even where the function caught what was raised in it
-            raise TimeIsUp from None
-        if raised:
-            raise raised
-        return result
+            return function(*arguments)
+        finally:
+            with self._lock:
+                self._inside = False
+            if self._expired:  # even where the function caught what was raised in it
+                raise TimeIsUp from None
 
-    def _leave(self) -> None:
-        with self._turn:  # the other thread does nothing more to this one
-            _raise_in(self._here, _NOTHING)
+    def _on_alarm(self, _: int, frame: FrameType | None) -> None:
+        if self._must_stop(frame):
+            raise TimeIsUp
 
-    def _watch(self, limit: float, notice: float) -> None:
-        if self._over.wait(min(notice, limit)):
-            return
-        if notice < limit:
-            self._tell(limit)
-            if self._over.wait(limit - notice):
-                return
-        again, rounds = _again(self._here), 0
-        while not self._over.is_set():
-            rounds += 1
-            with self._turn:
-                if self._inside:
-                    self._expired = True
-                    _raise_in(self._here, again)
-                    if rounds % _WAKE_EVERY == 0:
-                        self._wake()
-            self._over.wait(_AGAIN_S)
+    def _watch(self) -> None:
+        wait_s = NOTICE_S
+        while not self._over.wait(wait_s):
+            wait_s = LIMIT_S - NOTICE_S
+            with self._lock:
+                if self._must_stop(sys._current_frames().get(self._thread)):
+                    self._interrupt()
+                    return
 
-    def _tell(self, limit: float) -> None:
-        main = self._here == threading.main_thread().ident
-        words = f"still running: {'press ■ to stop' if main else f'it is stopped after {limit:g} s'}"
+    def _must_stop(self, frame: FrameType | None) -> bool:
+        """Show the notice at first; later return whether a call is running that must be stopped."""
+        if self._inside and is_debugging(frame):
+            self._noticed = False  # its time begins again
+        elif not self._noticed:
+            self._noticed = True
+            self._show_notice()
+        else:
+            self._expired = True
+        return self._expired and self._inside
+
+    def _interrupt(self) -> None:
+        if self._main:
+            signal.raise_signal(signal.SIGINT)  # on Windows it ends a sleep, too
+        else:
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(self._thread), ctypes.py_object(TimeIsUp))
+
+    def _show_notice(self) -> None:
+        words = f"still running: {'press ■ to stop' if self._main else f'it is stopped after {LIMIT_S:g} s'}"
         if any(show(words) for show in notices):
             return
         try:
             print(words, file=self._screen, flush=True)
-        except (OSError, ValueError):  # closed: nobody is there to be told
+        except (OSError, ValueError):  # a closed screen shows nothing
             self._screen = None
 
-    def _wake(self) -> None:
-        """Wake the main thread from where Ctrl-C would, unless it is deaf to that."""
-        if self._here != threading.main_thread().ident or not callable(signal.getsignal(signal.SIGINT)):
-            return
-        if hasattr(signal, "pthread_kill"):
-            signal.pthread_kill(self._here, signal.SIGINT)
-        else:  # Windows, where it ends a sleep from any thread
-            signal.raise_signal(signal.SIGINT)
+
+def is_debugging(frame: FrameType | None) -> bool:
+    """Whether the thread of this innermost frame waits in a debugger."""
+    while frame and frame.f_globals.get("__name__") not in _DEBUGGERS:
+        frame = frame.f_back
+    return frame is not None
