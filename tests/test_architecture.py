@@ -142,11 +142,12 @@ def reached(names: Iterable[str]) -> set[str]:
 
 
 def of_one_lesson() -> list[str]:
-    """The modules of the packages that one lesson reaches, and nothing else."""
+    """The modules of the packages, but for a folder's own `__init__`, that one lesson reaches, and nothing else."""
     used = set().union(*graph().values(), *map(told, LESSONS))
     shared = reached(MODULES.keys() - VIEWS.keys() - used)
     lessons = Counter(name for names in map(told, LESSONS) for name in reached(names))
-    return [name for name in MODULES if lessons[name] == 1 and name not in shared | VIEWS.keys()]
+    alone = [name for name in MODULES if lessons[name] == 1 and name not in shared | VIEWS.keys()]
+    return [name for name in alone if MODULES[name].name != "__init__.py"]
 
 
 def part(name: str) -> str:
@@ -173,7 +174,7 @@ def test_arrows_between_the_packages_run_one_way() -> None:
         f"{one} names {other}"
         for one, others in graph().items()
         for other in others
-        if STREET.index(house(other)) > STREET.index(house(one)) and one != "camviz"  # which says where old names are
+        if STREET.index(house(other)) > STREET.index(house(one))
     ]
     assert wrong == []
 
@@ -235,8 +236,7 @@ def test_what_is_true_needs_nothing_that_draws(name: str) -> None:
 
 
 def test_no_package_imports_what_lies_beside_a_lesson() -> None:
-    """camviz itself names it, which says where old names are."""
-    packages = {name: others for name, others in graph().items() if name not in VIEWS and name != "camviz"}
+    packages = {name: others for name, others in graph().items() if name not in VIEWS}
     beside = {"camviz_school.views", *VIEWS}
     assert [f"{name} names {other}" for name, others in packages.items() for other in others & beside] == []
 

@@ -1,9 +1,8 @@
-"""Damaged files, pictures and command lines: what an attack found, and a small one from the seed of the large one."""
+"""Damaged files, pictures and command lines: each is read, or refused in one sentence."""
 
 import json
 import os
 import struct
-import sys
 import zlib
 from math import inf, nan
 from pathlib import Path
@@ -23,10 +22,7 @@ from camviz_clinic.files import CalibrationError
 from camviz_clinic.files.output import as_json, json_text
 from camviz_school.course.working_copy import MANIFEST, lay_out
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tools/benchmarks"))
-import attack
-import hostile
-
+DATA = Path(__file__).parent / "data"
 BOARD = Board(9, 6, 0.025)
 KINDS = ("png", "jpg", "tif", "bmp", "pgm", "webp", "jp2", "hdr")
 
@@ -38,12 +34,17 @@ def picture(path: Path, height: int = 40, width: int = 60) -> bytes:
     return path.read_bytes()
 
 
+def chunk(kind: bytes, content: bytes) -> bytes:
+    """A chunk of a PNG file, with its length and checksum."""
+    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+
+
 def png(width: int, height: int) -> bytes:
     """A PNG file of few bytes that announces so many pixels of one bit."""
     header = struct.pack(">IIBBBBB", width, height, 1, 0, 0, 0, 0)
     rows = zlib.compress(b"\0" * 1000)
     chunks = ((b"IHDR", header), (b"IDAT", rows), (b"IEND", b""))
-    return b"\x89PNG\r\n\x1a\n" + b"".join(hostile.chunk(*each) for each in chunks)
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*each) for each in chunks)
 
 
 def complaint(path: Path) -> str:
@@ -52,44 +53,6 @@ def complaint(path: Path) -> str:
     assert str(caught.value) == f"{path}: {caught.value.why}"
     assert caught.value.why.isprintable()
     return caught.value.why
-
-
-# The small attack -----------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def case(tmp_path_factory):
-    return attack.Case(tmp_path_factory.mktemp("attack"), seed=1)
-
-
-@pytest.mark.parametrize(("kind", "count"), [("files", 120), ("pictures", 60)])
-@pytest.mark.filterwarnings("ignore")
-def test_whatever_is_done_to_a_file_it_is_read_or_refused_in_one_sentence(case, kind, count):
-    assert {case.run(kind, number) for number in range(count)} <= {"done", "refused"}
-
-
-def test_a_case_can_be_made_again_from_its_number(case):
-    content, other = case.files["opencv_mono.json"], case.files["ros_file.yaml"]
-    made = [hostile.mutated(case.rng("files", number), content, other) for number in (1, *range(20))]
-    assert made[0] == made[2]
-    assert len(set(made)) > 10
-
-
-@pytest.mark.parametrize(
-    ("status", "out", "err", "what"),
-    [
-        (0, "fine\n", "", "done"),
-        (2, "", "camviz: no.\n", "refused"),
-        (7, "", "", "exit status 7"),
-        (1, "", "Traceback (most recent call last):\nKeyError: 1", "a traceback: KeyError: 1"),
-        (0, "\x1b[2J", "", "commands the terminal"),
-        (0, '{"rms": NaN}', "", "JSON that is not strict: NaN"),
-        (2, "", "some warning", "without a sentence"),
-        (0, "[" + 70_000 * "1,", "", "JSON that is not strict"),
-    ],
-)
-def test_the_attack_knows_what_is_wrong(status, out, err, what):
-    assert what in attack.judged(status, out, err, as_json=out.startswith(("{", "[")))
 
 
 # Pictures -------------------------------------------------------------------------------------------------------------
@@ -209,10 +172,12 @@ def test_what_json_cannot_say_is_null_for_programs_and_refused_in_calibrations()
 @pytest.mark.parametrize("number", ["1e6", "-1e6", "9e8"])
 def test_an_inspection_of_absurd_numbers_is_strict_json(tmp_path, number):
     """cx of 1e6, a tangential coefficient of 1e6: the faults that an inspection is there to name."""
-    good = (attack.DATA / "opencv_mono.json").read_text()
+    good = (DATA / "opencv_mono.json").read_text()
     data = json.loads(good)["camera_matrix"]["data"]
     (tmp_path / "camera.json").write_text(good.replace(repr(data[2]), number, 1))
-    assert attack.strict(inspect_file(tmp_path / "camera.json").as_json()) == ""
+    json.loads(
+        inspect_file(tmp_path / "camera.json").as_json(), parse_constant=lambda word: pytest.fail(f"{word} is no JSON")
+    )
 
 
 @pytest.mark.parametrize(
@@ -228,17 +193,19 @@ def test_json_that_is_a_trap_is_refused_in_one_sentence(tmp_path, name, text, wh
     (tmp_path / name).write_text(text)
     with pytest.raises(CalibrationError, match=what) as caught:
         camviz_clinic.load(tmp_path / name)
-    assert attack.sentence(str(caught.value)) == "refused"
+    assert str(caught.value).isprintable()
+    assert len(str(caught.value)) < 2000
 
 
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "1e999", "9" * 5000])
 def test_numbers_that_are_none_are_refused(tmp_path, number):
-    good = (attack.DATA / "opencv_mono.json").read_text()
+    good = (DATA / "opencv_mono.json").read_text()
     focal_length = json.loads(good)["camera_matrix"]["data"][0]
     (tmp_path / "camera.json").write_text(good.replace(repr(focal_length), number, 1))
     with pytest.raises(CalibrationError) as caught:
         camviz_clinic.load(tmp_path / "camera.json")
-    assert attack.sentence(str(caught.value)) == "refused"
+    assert str(caught.value).isprintable()
+    assert len(str(caught.value)) < 2000
 
 
 def test_a_manifest_nested_without_end_is_taken_for_none(tmp_path):

@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from importlib import import_module
 from math import inf
 from pathlib import Path
 
@@ -366,18 +365,3 @@ def test_two_shared_views_do_not_judge_a_pair(stereo):
     calibration, after = stereo
     few = replace(after, cam_from_board=after.cam_from_board[:2])
     assert judged_pair(calibration, few).verdict == "inconclusive"
-
-
-# Two hundred deployments, a share of them -----------------------------------------------------------------------------
-
-
-@pytest.mark.thorough
-def test_a_share_of_the_benchmark_is_judged_rightly(monkeypatch):
-    """tools/benchmarks/deployments.py judges 198; these are every 24th."""
-    monkeypatch.syspath_prepend(ROOT / "tools/benchmarks")
-    found = list(import_module("deployments").deployments(1 / 24))
-    assert {each.kind for each in found} == {"healthy", "knocked", "refocused", "resized", "thin"}
-    assert [each for each in found if each.kind == "healthy" and each.check.verdict == "fail"] == []
-    assert [each for each in found if each.off >= 1 and each.check.verdict == "pass"] == []
-    assert {each.check.verdict for each in found if each.kind == "thin"} == {"inconclusive"}
-    assert [each for each in found if each.kind == "resized" and "pixels, the" not in each.check.worst.reason] == []

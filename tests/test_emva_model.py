@@ -1,6 +1,6 @@
 """The model of EMVA 1288 is tested before a figure is told: what breaks it withholds what it spoils, and says why.
 
-The cameras are those of `odd_cameras`. Every test draws with a fixed seed; tools/benchmarks/emva.py asks many of each.
+The cameras are those of `odd_cameras`. Every test draws with a fixed seed.
 """
 
 import re

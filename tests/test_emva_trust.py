@@ -1,7 +1,7 @@
 """A figure of `camviz noise` is near the truth or withheld: where rounding, a clipped black level and rows hide it.
 
 The cameras are plain NumPy, photon by photon (`plain_cameras`). Every test draws with a fixed seed; "false failure" is
-how often a correct measurement would fail it if the seed were drawn anew. tools/benchmarks/emva.py asks hundreds.
+how often a correct measurement would fail it if the seed were drawn anew.
 """
 
 from dataclasses import replace

@@ -1,6 +1,5 @@
 """Optics of pinholes, thin lenses and lenses of real elements. Millimetres, nanometres, seconds."""
 
-from camviz import _answering
 from camviz.optics.elements import COOKE_TRIPLET, TELEPHOTO, Prescription, free_space, ideal_lens, refraction
 from camviz.optics.modulation import (
     cutoff_per_mm,
@@ -81,5 +80,3 @@ __all__ = [
     "unvignetted_share",
     "working_f_number",
 ]
-
-__getattr__ = _answering("optics")

@@ -3,7 +3,6 @@
 How the tracer works is read most easily in `camviz.scenes.plain_tracer`.
 """
 
-from camviz import _answering
 from camviz.scenes.light import to_display, to_encoded, to_linear
 from camviz.scenes.mesh import Mesh
 from camviz.scenes.scene import Scene, render, snapshot
@@ -31,5 +30,3 @@ __all__ = [
     "to_linear",
     "wireframe_scene",
 ]
-
-__getattr__ = _answering("scenes")

@@ -1,6 +1,5 @@
 """Image sensors: what turns light into numbers, after EMVA Standard 1288, release 4.0 (linear)."""
 
-from camviz import _answering
 from camviz.sensors.correction import NoiseModel, average, flattened, less_dark, merged, smoothed
 from camviz.sensors.counting import poisson
 from camviz.sensors.dark import band_gap_ev, dark_current_ratio, doubling_temperature_k
@@ -60,5 +59,3 @@ __all__ = [
     "smoothed",
     "transferred",
 ]
-
-__getattr__ = _answering("sensors")

@@ -142,7 +142,7 @@ def test_handles_follow_the_pointer(lesson, thorough) -> None:
 
 @pytest.mark.parametrize("width", [375, pytest.param(1440, marks=pytest.mark.thorough)])
 def test_every_word_can_be_read_on_a_telephone_and_on_a_desk(lesson, window, width) -> None:
-    """At least 12 CSS pixels, whole, and over no other word; `tools/benchmarks/readable.py` looks at widths between."""
+    """At least 12 CSS pixels, whole, and over no other word."""
     assert lesson.unreadable(width) == []
 
 

@@ -19,7 +19,7 @@ from camviz_clinic.checks.virtual import healthy, healthy_pair
 PAGE = Path(__file__).parents[2] / "docs" / "clinic.md"
 TEMPLATE = Path(__file__).with_name("clinic.template.md")
 TABLES = "<!-- The tables below are counted by: python tools/docs/clinic.py -->"
-BELOW = "\n## Standard deviations\n"  # below the tables; by hand, and by tools/benchmarks/intervals.py and field.py
+BELOW = "\n## Standard deviations\n"  # below the tables; by hand
 
 
 def count_all(progress: Callable[[str], object] = print) -> str:

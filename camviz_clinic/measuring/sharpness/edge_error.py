@@ -12,9 +12,7 @@ from scipy.special import chdtri
 from camviz.lenses.base import Array
 
 PROCESSED = 1.3  # times the sides' noise: more scatter than that near the edge is no noise of the sensor's
-SHARE_OF_PROCESSED = (
-    0.2  # of a row's scatter, that all rows have alike: found on JPEGs, tools/benchmarks/mtf_troubles.py
-)
+SHARE_OF_PROCESSED = 0.2  # of a row's scatter, that all rows have alike: found on JPEGs
 UNLIKELY = 0.1  # the chance at which pieces of a clean edge count as differing
 FLOOR = 3e-5  # of ln MTF: 31 blurred edges of 16 bits without noise were 1.4e-5 of MTF50 off, and at most 3.6e-5
 NEAREST_NUMBERS = 5  # of a side's level: the widest gap between these is the step of the picture's numbers there
