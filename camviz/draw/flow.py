@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from html import escape
 
 from camviz.draw import labels, svg
+from camviz.draw.marks import Marks
+from camviz.draw.writing import PageWriter
 
 WIDTH = 960  # picture units, of every row
 FLOW_WIDTH = "max(800px,138vh)"  # of a picture, so that its main panel and the controls fit a screen together
@@ -30,28 +32,32 @@ class Sentences(str):
     __slots__ = ()
 
 
+Part = Marks | Sentences
+"""What a tile shows."""
+
+
 @dataclass(frozen=True)
 class Tile:
-    """A part of a picture that can stand alone: its name, its cell, and its SVG in the picture's units."""
+    """A part of a picture that can stand alone: its name, its cell, and its marks in the picture's units."""
 
     name: str
     cell: Cell
-    body: str
+    marks: Marks
     words: str = ""
-    """Sentences, a line each: a page has them as its own text, which wraps; `body` has them for saved pictures."""
+    """Sentences, a line each: a page has them as its own text, which wraps; `marks` have them for saved pictures."""
 
     @classmethod
-    def of(cls, name: str, cell: Cell, part: str) -> Tile:
-        """The tile of a part: of SVG, or of `Sentences`."""
+    def of(cls, name: str, cell: Cell, part: Part) -> Tile:
+        """The tile of a part: of marks, or of `Sentences`."""
         if not isinstance(part, Sentences):
             return cls(name, cell, part)
         x, y, width, _ = cell
         return cls(name, cell, svg.paragraph((x + 20, y + 18), part, width - 40, "label"), part)
 
-    def uncluttered(self, unit: float = 1.0) -> str:
-        """The SVG with its words clear of each other, where `unit` picture units make a CSS pixel."""
+    def uncluttered(self, unit: float = 1.0) -> Marks:
+        """The marks with their words clear of each other, where `unit` picture units make a CSS pixel."""
         x, y, width, height = self.cell
-        return labels.uncluttered(self.body, (x, y, x + width, y + height), max(unit, 1.0))
+        return labels.uncluttered(self.marks, (x, y, x + width, y + height), max(unit, 1.0))
 
     def style(self, scaled: str = "") -> str:
         """How the tile takes its place among others in a line that wraps, as CSS.
@@ -71,7 +77,7 @@ class Tile:
     @property
     def _sizes(self) -> tuple[float, float]:
         """The least and the greatest size among others, as parts of its own."""
-        return (0.72, 1.5) if "data-panel" in self.body else (0.92, 1.15)
+        return (0.72, 1.5) if self.marks.panels() else (0.92, 1.15)
 
     def html(self, unit: float = 1.0) -> str:
         """The tile as an element of a page that has `flow.css`; `unit` is how many picture units make a CSS pixel."""
@@ -80,8 +86,9 @@ class Tile:
             return f'<div class="camviz-tile" data-tile="{name}" style="flex:1 1 100%">{self.sentences}</div>'
         kind = f'class="camviz-tile camviz-scrolled" {_KEYS}' if self.cell[2] > SCROLLED else 'class="camviz-tile"'
         name = escape(self.name)
+        size = f'style="aspect-ratio:{self.cell[2]:g}/{self.cell[3]:g}"'  # known before the tile is drawn
         fold = f'<button type="button" class="camviz-fold" aria-expanded="true">{name}</button>'
-        return f'<div {kind} data-tile="{name}" style="{self.style(_PRESENTED)}">{fold}{self._svg(unit)}</div>'
+        return f'<div {kind} data-tile="{name}" style="{self.style(_PRESENTED)}">{fold}{self._svg(unit, size)}</div>'
 
     def image(self, source: str, words: str, *, later: bool = False) -> str:
         """The tile as an image among others that flow on a page without a style sheet; `words` say what it shows.
@@ -103,14 +110,15 @@ class Tile:
     def document(self, sheet: str) -> str:
         """The tile as an SVG document with a style sheet, its words clear of each other in the columns of `STILL`."""
         _, _, width, height = self.cell
-        size = f'width="{width:g}" height="{height:g}" style="--w:{width:g};--shown:100vw" '
-        return self._svg(min(STILL, 1 / self._sizes[0]), sheet).replace("<svg ", f"<svg {size}", 1)
+        size = f'width="{width:g}" height="{height:g}" style="--w:{width:g};--shown:100vw"'
+        return self._svg(min(STILL, 1 / self._sizes[0]), size, sheet)
 
-    def _svg(self, unit: float, sheet: str = "") -> str:
+    def _svg(self, unit: float, size: str, sheet: str = "") -> str:
         box = " ".join(f"{value:g}" for value in self.cell)
+        body = PageWriter().write(self.uncluttered(unit))
         return (
             f'<svg xmlns="http://www.w3.org/2000/svg" class="camviz-svg camviz-fitted" role="group" '
-            f'aria-label="{escape(self.name)}" viewBox="{box}">{sheet}{self.uncluttered(unit)}</svg>'
+            f'aria-label="{escape(self.name)}" viewBox="{box}" {size}>{sheet}{body}</svg>'
         )
 
 

@@ -6,11 +6,11 @@ is wider than what most systems have, so that what is free here is free there.
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from html import escape, unescape
-from math import inf
+
+from camviz.draw.marks import Group, Inset, Marks, Text
 
 SMALLEST = 12  # CSS pixels, of any word at any size of the picture
 SIZES = {"title": 14.0, "note": 12.0, "tick": 12.0, "number": 12.5, "": 13.0}  # picture units, as in style.css
@@ -23,82 +23,79 @@ _WIDTHS = {
 }  # fmt: skip
 _WIDTH = {letter: width for width, letters in _WIDTHS.items() for letter in letters}
 _BOLD, _MONO, _UNKNOWN = 1.12, 0.61, 0.7
-_TOKEN = re.compile(r"<svg ([^>]*)>|</svg>|<text ([^>]*)>((?:[^<]|</?tspan)*)</text>")
-_TAG = re.compile(r"<[^>]*>")
-_ATTRIBUTE = re.compile(r'([\w-]+)="([^"]*)"')
-_STYLED_SIZE = re.compile(r"font-size:([\d.]+)px")
-
 Box = tuple[float, float, float, float]
 """Left, top, right and bottom, in picture units."""
 
 
 @dataclass(frozen=True)
 class Words:
-    """One text of a picture: where it stands, what it may do to make room, and the rectangle in which it is seen."""
+    """One text of a picture: the rectangles that it takes and is seen in, and what it may do to make room."""
 
-    start: int
-    end: int
-    x: float
-    y: float
+    mark: Text
     box: Box
     seen: Box
     rank: int
     moves: tuple[tuple[float, float], ...]
     may_go: bool
     lines: tuple[str, ...] = ()
-    step: float = 0.0
+    leading: float = 0.0
+
+    @property
+    def text(self) -> str:
+        return self.mark.words
+
+    def moved(self, dx: float, dy: float) -> Text:
+        """The mark at its new place, a paragraph in lines."""
+        return replace(self.mark, x=self.mark.x + dx, y=self.mark.y + dy, lines=self.lines, leading=self.leading)
 
 
-def uncluttered(body: str, tile: Box, unit: float = 1.0) -> str:
-    """The SVG of a tile with every word clear of the others and within what is seen, where that can be had.
+def uncluttered(marks: Marks, tile: Box, unit: float = 1.0) -> Marks:
+    """The marks of a tile with every word clear of the others and within what is seen, where that can be had.
 
     `tile` is the rectangle of the picture that is shown, `unit` how many picture units make a CSS pixel: where a
     picture is shown small, its words are larger in it. A label in a panel moves up or down; a tick or a hint goes.
     """
-    found = sorted(words_of(body, tile, unit), key=lambda words: words.rank)
+    found = words_of(marks, tile, unit)
     taken: list[Box] = []
-    edits: list[tuple[int, int, str]] = []
-    for words in found:
+    placed: dict[int, Text | None] = {}
+    for index, words in sorted(enumerate(found), key=lambda each: each[1].rank):
         shift = _free(words, taken)
-        if shift is None:
-            edits.append((words.start, words.end, ""))
-            continue
-        dx, dy = shift
-        left, top, right, bottom = words.box
-        taken.append((left + dx, top + dy, right + dx, bottom + dy))
-        if dx or dy or words.lines:
-            edits.append((words.start, words.end, _rewritten(body[words.start : words.end], words, dx, dy)))
-    for start, end, text in sorted(edits, reverse=True):
-        body = body[:start] + text + body[end:]
-    return body
+        placed[index] = words.moved(*shift) if shift else None
+        if shift:
+            taken.append(_shifted(words.box, *shift))
+    return _with_texts(marks, iter([placed[index] for index in range(len(found))]))
 
 
-def words_of(body: str, tile: Box, unit: float = 1.0) -> list[Words]:
-    """Every text of a tile's SVG with the rectangle that it takes."""
-    found: list[Words] = []
-    frames: list[tuple[float, float, Box]] = [(0.0, 0.0, tile)]
-    for token in _TOKEN.finditer(body):
-        panel, attributes, text = token.groups()
-        if panel is not None:
-            frames.append(_frame(dict(_ATTRIBUTE.findall(panel)), frames[-1]))
-        elif attributes is None:
-            frames.pop()
-        elif text.strip():
-            x, y, seen = frames[-1]
-            given = dict(_ATTRIBUTE.findall(attributes))
-            found.append(
-                _words(
-                    token.start(),
-                    token.end(),
-                    given,
-                    unescape(_TAG.sub(" ", text)),
-                    (x, y),
-                    seen,
-                    len(frames) > 1,
-                    unit,
-                )
-            )
-    return found
+def _with_texts(marks: Marks, texts: Iterator[Text | None]) -> Marks:
+    """The marks with their texts replaced, in order; without those that are None."""
+    kept = []
+    for mark in marks:
+        if isinstance(mark, Group | Inset):
+            kept.append(replace(mark, marks=_with_texts(mark.marks, texts)))
+        elif not isinstance(mark, Text) or not mark.words.strip():
+            kept.append(mark)
+        elif (text := next(texts)) is not None:
+            kept.append(text)
+    return Marks(kept)
+
+
+def words_of(marks: Marks, tile: Box, unit: float = 1.0) -> list[Words]:
+    """Every text of a tile with the rectangle that it takes, in the order in which they are drawn."""
+    return list(_words_within(marks, (0.0, 0.0), tile, unit, False))
+
+
+def _words_within(marks: Marks, origin: tuple[float, float], seen: Box, unit: float, inside: bool) -> Iterator[Words]:
+    """The texts of marks whose coordinates begin at `origin`; `inside` a panel or not."""
+    for mark in marks:
+        if isinstance(mark, Inset):
+            x, y = origin[0] + mark.x, origin[1] + mark.y
+            left, top, right, bottom = seen
+            within = max(left, x), max(top, y), min(right, x + mark.width), min(bottom, y + mark.height)
+            yield from _words_within(mark.marks, (x, y), within, unit, True)
+        elif isinstance(mark, Group):
+            yield from _words_within(mark.marks, origin, seen, unit, inside)
+        elif isinstance(mark, Text) and mark.words.strip():
+            yield _words(mark, origin, seen, inside, unit)
 
 
 def overlap(one: Box, other: Box, least: float = 0.5) -> bool:
@@ -120,46 +117,29 @@ def width(words: str, size: float, *, bold: bool = False, mono: bool = False) ->
     return sum([_WIDTH.get(letter, _UNKNOWN) for letter in words]) * size * (_BOLD if bold else 1.0)
 
 
-def _frame(given: dict[str, str], outer: tuple[float, float, Box]) -> tuple[float, float, Box]:
-    """Where a panel's own coordinates begin, and what is seen of it."""
-    x, y, (left, top, right, bottom) = outer
-    x, y = x + float(given.get("x", 0)), y + float(given.get("y", 0))
-    wide, high = float(given.get("width", inf)), float(given.get("height", inf))
-    return x, y, (max(left, x), max(top, y), min(right, x + wide), min(bottom, y + high))
-
-
-def _words(
-    start: int,
-    end: int,
-    given: dict[str, str],
-    text: str,
-    at: tuple[float, float],
-    seen: Box,
-    inside: bool,
-    unit: float,
-) -> Words:
-    classes = given.get("class", "").split()
+def _words(mark: Text, origin: tuple[float, float], seen: Box, inside: bool, unit: float) -> Words:
+    classes = mark.class_.split()
     role = next((name for name in SIZES if name in classes), "")
-    styled = _STYLED_SIZE.search(given.get("style", ""))
-    size = max(float(styled[1]) if styled else SIZES[role], SMALLEST * unit)
-    bold = role == "title" or "font-weight:600" in given.get("style", "")
-    lines = _wrapped(text, float(given["data-width"]), size) if "data-width" in given else ()
-    long = max(width(line, size, bold=bold, mono=role == "number") for line in lines or (text,))
+    size = max(float(mark.style.get("font_size", SIZES[role])), SMALLEST * unit)
+    bold = role == "title" or mark.style.get("font_weight") == 600
+    lines = _wrapped(mark.words, mark.wrap_width, size) if mark.wrap_width is not None else ()
+    long = max(width(line, size, bold=bold, mono=role == "number") for line in lines or (mark.words,))
     before = long if "end" in classes else long / 2 if "middle" in classes else 0.0
-    x, y = float(given["x"]), float(given["y"])
-    if "data-from" in given:  # a legend grows as a whole from a corner
-        from_x, from_y = map(float, given["data-from"].split())
+    x, y = mark.x, mark.y
+    if mark.grows_from:  # a legend grows as a whole from a corner
+        from_x, from_y = mark.grows_from
         x, y = from_x + unit * (x - from_x), from_y + unit * (y - from_y)
-    x, y = at[0] + x, at[1] + y
-    turned, step = "rotate(-90" in given.get("transform", ""), LEADING * size
-    if turned:
+    x, y = origin[0] + x, origin[1] + y
+    leading = LEADING * size
+    upright = mark.turned_deg == -90
+    if upright:
         box = (x - ASCENT * size, y - long + before, x + DESCENT * size, y + before)
     else:
-        below = y + DESCENT * size + step * max(len(lines) - 1, 0)
+        below = y + DESCENT * size + leading * max(len(lines) - 1, 0)
         box = (x - before, y - ASCENT * size, x - before + long, below)
-    rank, moves = (FIXED, ()) if "data-from" in given else _manners(role, classes, inside, turned, size)
+    rank, moves = (FIXED, ()) if mark.grows_from else _manners(role, classes, inside, upright, size)
     may_go = rank > 2 and not lines
-    return Words(start, end, float(given["x"]), float(given["y"]), box, seen, rank, moves, may_go, lines, step)
+    return Words(mark, box, seen, rank, moves, may_go, lines, leading)
 
 
 def _wrapped(text: str, room: float, size: float) -> tuple[str, ...]:
@@ -221,17 +201,3 @@ def _inward(words: Words, dx: float, dy: float) -> tuple[float, float] | None:
 
 def _shifted(box: Box, dx: float, dy: float) -> Box:
     return box[0] + dx, box[1] + dy, box[2] + dx, box[3] + dy
-
-
-def _rewritten(element: str, words: Words, dx: float, dy: float) -> str:
-    """The element at its new place, turned words about it, and a paragraph in lines."""
-    x, y = f"{words.x + dx:.6g}", f"{words.y + dy:.6g}"
-    element = re.sub(r' x="[^"]*" y="[^"]*"', f' x="{x}" y="{y}"', element, count=1)
-    element = re.sub(r"rotate\(-90 [^)]*\)", f"rotate(-90 {x} {y})", element)
-    if not words.lines:
-        return element
-    lines = (
-        f'<tspan x="{x}" dy="{words.step if i else 0:.6g}">{escape(line, quote=False)}</tspan>'
-        for i, line in enumerate(words.lines)
-    )
-    return f"{element[: element.index('>') + 1]}{''.join(lines)}</text>"

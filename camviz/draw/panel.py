@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from camviz.draw import svg
 from camviz.draw.flow import Cell
+from camviz.draw.marks import Inset, Marks
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,15 @@ class Panel:
         return np.array([self.width / (self.right - self.left), self.height / (self.bottom - self.top)])
 
     def show(
-        self, content: str, *, title: str = "", note: str = "", hint: str = "", drag: str | None = None, label: str = ""
-    ) -> str:
+        self,
+        content: Marks,
+        *,
+        title: str = "",
+        note: str = "",
+        hint: str = "",
+        drag: str | None = None,
+        label: str = "",
+    ) -> Marks:
         """The content clipped to the panel, with its title and a note above.
 
         With `drag` the whole panel becomes a handle of that name for pointer and arrow keys; `label` tells a screen
@@ -48,16 +56,13 @@ class Panel:
         """
         # Beside the title, and beyond the end of a panel too narrow for both.
         right = (self.x + max(self.width, 7.8 * len(title) + 6.8 * len(note or hint) + 10), self.y - 8)
-        heading = svg.text((self.x, self.y - 8), title, "title") if title else ""
-        heading += svg.text(right, note, "note end") if note else ""
-        heading += svg.text(right, hint, "note end hint") if hint else ""
+        heading = svg.text((self.x, self.y - 8), title, "title") * bool(title)
+        heading += svg.text(right, note, "note end") * bool(note)
+        heading += svg.text(right, hint, "note end hint") * bool(hint)
         handle = {"data_drag": drag, "tabindex": 0, "role": "group", "aria_label": label or drag} if drag else {}
         backdrop = svg.rectangle(0, 0, self.width, self.height, "card")
-        inner = svg.element(
-            "svg", backdrop + content, x=self.x, y=self.y, width=self.width, height=self.height,
-            viewBox=f"0 0 {self.width:g} {self.height:g}", data_panel=self.name, overflow="hidden", **handle,
-        )  # fmt: skip
-        return heading + inner + svg.rectangle(self.x, self.y, self.width, self.height, "frame")
+        inset = Inset(self.name, self.x, self.y, self.width, self.height, backdrop + content, handle)
+        return heading + [inset] + svg.rectangle(self.x, self.y, self.width, self.height, "frame")
 
 
 def image_panel(
@@ -88,7 +93,7 @@ def image_in(cell: Cell, name: str, image_width: int, image_height: int) -> Pane
     return replace(panel, x=x + (width - panel.width) / 2)
 
 
-def placed_image(panel: Panel, attached: str, image_width: int, image_height: int, **attributes: Any) -> str:
+def placed_image(panel: Panel, attached: str, image_width: int, image_height: int, **style: Any) -> Marks:
     """The attached photograph where its pixels belong in an image panel."""
     (x0, y0), (x1, y1) = panel.place([(-0.5, -0.5), (image_width - 0.5, image_height - 0.5)])
-    return svg.image(attached, x0, y0, x1 - x0, y1 - y0, **attributes)
+    return svg.image(attached, x0, y0, x1 - x0, y1 - y0, **style)

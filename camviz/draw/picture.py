@@ -1,4 +1,4 @@
-"""A finished picture: SVG text with photographs attached, that can show itself anywhere."""
+"""A finished picture: marks with photographs attached, that can show itself anywhere."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ from typing import Any, TypeVar
 import cv2
 import numpy as np
 
+from camviz.draw import styles, svg
 from camviz.draw.flow import FLOW_WIDTH, Tile
-from camviz.draw.portable import portable
+from camviz.draw.marks import Marks, join
+from camviz.draw.writing import FileWriter, PageWriter, element
 
 Part = TypeVar("Part")
 
@@ -35,7 +37,7 @@ class Picture:
     @classmethod
     def whole(
         cls,
-        body: str,
+        marks: Marks,
         width: float,
         height: float,
         title: str,
@@ -43,7 +45,7 @@ class Picture:
         photographs: dict[str, bytes] | None = None,
     ) -> Picture:
         """A picture of one tile."""
-        return cls((Tile(title, (0, 0, width, height), body),), title, description, photographs or {})
+        return cls((Tile(title, (0, 0, width, height), marks),), title, description, photographs or {})
 
     @property
     def width(self) -> float:
@@ -56,10 +58,15 @@ class Picture:
         return max(y + height for _, y, _, height in (tile.cell for tile in self.tiles))
 
     @cached_property
+    def marks(self) -> Marks:
+        """All tiles at their places, their words clear of each other."""
+        paper = svg.rectangle(0, 0, self.width, self.height, "paper")
+        return paper + join(tile.uncluttered() for tile in self.tiles)
+
+    @property
     def body(self) -> str:
-        """All tiles at their places, as SVG."""
-        paper = f'<rect x="0" y="0" width="{self.width:g}" height="{self.height:g}" class="paper"/>'
-        return paper + "".join(tile.uncluttered() for tile in self.tiles)
+        """All tiles at their places, as SVG for a page with the style sheet."""
+        return PageWriter().write(self.marks)
 
     def svg(self) -> str:
         """The body as an `<svg>` element whose photographs are still `attached:name`."""
@@ -96,7 +103,7 @@ class Picture:
         svg = self._with_photographs(self.svg()).replace(
             "viewBox=", f'width="{self.width:g}" height="{self.height:g}" viewBox=', 1
         )
-        return svg.replace("<title>", f"<style>{style()}</style><title>", 1)
+        return svg.replace("<title>", f"<style>{styles.sheet()}</style><title>", 1)
 
     def figure(self, address: Callable[[Tile], str] | None = None) -> str:
         """An HTML figure whose tiles flow, each an image; the first has the whole alternative text.
@@ -140,7 +147,14 @@ class Picture:
 
     def portable(self, theme: str = "light") -> str:
         """One SVG document in colours of the "light" or "dark" theme, for programs that are no browser."""
-        return portable(self.svg(), self.photographs, style(), theme)
+        size = {"width": self.width, "height": self.height}
+        words = element("title", escape(self.title)) + element("desc", escape(self.description))
+        content = FileWriter(theme, self.photographs).write(self.marks)
+        return '<?xml version="1.0" encoding="UTF-8"?>\n' + element(
+            "svg", words + content, xmlns="http://www.w3.org/2000/svg", version="1.1", **size,
+            viewBox=f"0 0 {self.width:g} {self.height:g}", font_family=styles.SANS, font_size=styles.SIZE,
+            **{"xmlns:xlink": "http://www.w3.org/1999/xlink"},
+        )  # fmt: skip
 
     def _repr_mimebundle_(self, **_: Any) -> dict[str, str]:
         return {"text/html": self.figure(), "text/plain": f"{self.title}. {self.description}"}
@@ -157,15 +171,9 @@ def png(image: np.ndarray) -> bytes:
 
 
 @cache
-def style() -> str:
-    """The style sheet that every picture shares."""
-    return (files("camviz.draw") / "style.css").read_text(encoding="utf-8")
-
-
-@cache
 def page_style() -> str:
     """The style sheets of a page on which tiles flow: no word on it is below 12 CSS pixels."""
-    return style() + (files("camviz.draw") / "flow.css").read_text(encoding="utf-8")
+    return styles.sheet() + (files("camviz.draw") / "flow.css").read_text(encoding="utf-8")
 
 
 def _converted(svg: str, suffix: str, dpi: float) -> bytes:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from camviz.draw import svg
+from camviz.draw.marks import Marks
 from camviz.draw.panel import Panel
 from camviz.draw.readout import true_minus
 
@@ -26,7 +27,7 @@ def axes(
     yticks: Ticks | None = None,
     *,
     aside: float = 40,
-) -> str:
+) -> Marks:
     """Tick labels and axis names around a plot panel, to stand beside `panel.show(grid(panel) + …)`.
 
     Ticks are found where none are given as (place, words), as for a logarithmic axis. The name of the y axis stands
@@ -44,11 +45,11 @@ def axes(
     ]
     parts.append(svg.text((panel.x + panel.width / 2, panel.y + panel.height + 34), xlabel, "note middle"))
     x, y = panel.x - aside, panel.y + panel.height / 2
-    parts.append(svg.text((x, y), ylabel, "note middle", transform=f"rotate(-90 {x:g} {y:g})"))
-    return "".join(parts)
+    parts.append(svg.text((x, y), ylabel, "note middle", turned_deg=-90))
+    return svg.join(parts)
 
 
-def grid(panel: Panel, xticks: Ticks | None = None, yticks: Ticks | None = None) -> str:
+def grid(panel: Panel, xticks: Ticks | None = None, yticks: Ticks | None = None) -> Marks:
     """Grid lines at the ticks, and the axes x = 0 and y = 0 where they are inside."""
     xs = _places(_found(panel.left, panel.right, panel.width) if xticks is None else xticks)
     ys = _places(_found(panel.bottom, panel.top, panel.height) if yticks is None else yticks)
@@ -59,7 +60,7 @@ def grid(panel: Panel, xticks: Ticks | None = None, yticks: Ticks | None = None)
 
 def plotted(
     panel: Panel,
-    content: str,
+    content: Marks,
     xlabel: str,
     ylabel: str,
     xticks: Ticks | None = None,
@@ -67,30 +68,30 @@ def plotted(
     *,
     aside: float = 40,
     **heading: str,
-) -> str:
+) -> Marks:
     """A plot with its grid and axes around what it shows; `heading` is what `Panel.show` takes, `aside` what `axes`."""
     shown = panel.show(grid(panel, xticks, yticks) + content, **heading)
     return shown + axes(panel, xlabel, ylabel, xticks, yticks, aside=aside)
 
 
-def logarithmic_grid(panel: Panel, xticks: Ticks, yticks: Ticks) -> str:
+def logarithmic_grid(panel: Panel, xticks: Ticks, yticks: Ticks) -> Marks:
     """Grid lines at the ticks of axes that hold logarithms, on which 0 is no place of its own."""
     return _lines(panel, _places(xticks), _places(yticks))
 
 
-def _lines(panel: Panel, xs: Sequence[float], ys: Sequence[float]) -> str:
+def _lines(panel: Panel, xs: Sequence[float], ys: Sequence[float]) -> Marks:
     lines = [_pairs(x, (panel.bottom, panel.top)) for x in xs] + [_pairs((panel.left, panel.right), y) for y in ys]
     return svg.path(map(panel.place, lines), "grid")
 
 
-def curve(panel: Panel, x: np.ndarray, y: np.ndarray, class_: str) -> str:
+def curve(panel: Panel, x: np.ndarray, y: np.ndarray, class_: str) -> Marks:
     """The line through (x, y), both (n,); values far outside the panel are cut so that the text stays short."""
     points = panel.place(np.stack([x, y], axis=-1))
     outside = (np.abs(points[:, 1] - panel.height / 2) > 3 * panel.height)[:, None]
     return svg.line(np.where(outside, np.nan, points), class_)
 
 
-def bars(panel: Panel, left: np.ndarray, right: np.ndarray, top: np.ndarray, class_: str) -> str:
+def bars(panel: Panel, left: np.ndarray, right: np.ndarray, top: np.ndarray, class_: str) -> Marks:
     """Upright bars from 0, between `left` and `right` and as high as `top`, each (n,), as one element; NaN has none."""
     known = np.isfinite(top)
     left, right, top = left[known], right[known], np.minimum(top[known], panel.top)
@@ -98,11 +99,11 @@ def bars(panel: Panel, left: np.ndarray, right: np.ndarray, top: np.ndarray, cla
     return svg.path(map(panel.place, corners), class_, closed=True)
 
 
-def between(panel: Panel, x: np.ndarray, low: np.ndarray, high: np.ndarray, class_: str) -> str:
+def between(panel: Panel, x: np.ndarray, low: np.ndarray, high: np.ndarray, class_: str) -> Marks:
     """The area between two curves over x, all (n,), shaded."""
     known = np.isfinite(low + high)
     outline = np.concatenate([_pairs(x[known], low[known]), _pairs(x[known], high[known])[::-1]])
-    return svg.polygon(panel.place(outline), f"wash {class_}") if known.sum() > 1 else ""
+    return svg.polygon(panel.place(outline), f"wash {class_}") if known.sum() > 1 else svg.NOTHING
 
 
 def logarithmic(low: float, high: float) -> list[tuple[float, str]]:
@@ -120,23 +121,23 @@ def logs(pair: tuple[float, float]) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def band(panel: Panel, x0: float, x1: float, class_: str) -> str:
+def band(panel: Panel, x0: float, x1: float, class_: str) -> Marks:
     """The vertical band x0 … x1, shaded."""
     (left, _), (right, _) = panel.place([(max(x0, panel.left), 0), (min(x1, panel.right), 0)])
-    return svg.rectangle(left, 0, right - left, panel.height, f"wash {class_}") if right > left else ""
+    return svg.rectangle(left, 0, right - left, panel.height, f"wash {class_}") if right > left else svg.NOTHING
 
 
-def upright(panel: Panel, x: float, class_: str) -> str:
+def upright(panel: Panel, x: float, class_: str) -> Marks:
     """A vertical line at x."""
     return svg.line(panel.place(_pairs(x, (panel.bottom, panel.top))), class_)
 
 
-def level(panel: Panel, y: float, class_: str) -> str:
+def level(panel: Panel, y: float, class_: str) -> Marks:
     """A horizontal line at y."""
     return svg.line(panel.place([(panel.left, y), (panel.right, y)]), class_)
 
 
-def legend(panel: Panel, entries: Sequence[tuple[str, str]], corner: str = "top left") -> str:
+def legend(panel: Panel, entries: Sequence[tuple[str, str]], corner: str = "top left") -> Marks:
     """Names of the lines in one corner of the panel: (class, words) pairs, each with a sample of its line.
 
     Where the picture is shown small, the whole legend grows out of its corner (flow.css), and no word leaves its line.
@@ -148,8 +149,8 @@ def legend(panel: Panel, entries: Sequence[tuple[str, str]], corner: str = "top 
     rows = [svg.rectangle(x - 6, y - 15, width, height, "card", fill_opacity=0.85)]
     for i, (class_, words) in enumerate(entries):
         rows.append(svg.line([(x, y + 18 * i - 4), (x + 20, y + 18 * i - 4)], class_))
-        rows.append(svg.text((x + 27, y + 18 * i), words, "note halo", data_from=f"{from_x:g} {from_y:g}"))
-    return svg.group("".join(rows), class_="legend", style=f"transform-origin:{from_x:g}px {from_y:g}px")
+        rows.append(svg.text((x + 27, y + 18 * i), words, "note halo", grows_from=(from_x, from_y)))
+    return svg.group(svg.join(rows), "legend", grows_from=(from_x, from_y))
 
 
 def ticks(low: float, high: float, count: float) -> np.ndarray:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from camviz.draw import svg
+from camviz.draw.marks import Marks
 
 
 def true_minus(words: str) -> str:
@@ -66,8 +67,7 @@ def readout(
     step: tuple[float, float],
     value_at: tuple[float, float],
     class_: str = "label",
-    **attributes: str,
-) -> str:
+) -> Marks:
     """Names with their values, the first name `at` a place, `step` from name to name and `value_at` from name to value.
 
     What is the reader's own, "yours" in its name, is orange.
@@ -78,8 +78,8 @@ def readout(
         of_the_reader = "yours" in name
         rows.append(svg.text((x, y), name, "note"))
         place = (x + value_at[0], y + value_at[1])
-        rows.append(svg.text(place, value, "orange" if of_the_reader else class_, **attributes))
-    return "".join(rows)
+        rows.append(svg.text(place, value, "orange" if of_the_reader else class_))
+    return svg.join(rows)
 
 
 def _pairs(figures: Mapping[str, str] | Iterable[tuple[str, str]]) -> Iterable[tuple[str, str]]:

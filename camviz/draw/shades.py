@@ -18,6 +18,7 @@ from contourpy import contour_generator
 from numpy.typing import ArrayLike, NDArray
 
 from camviz.draw import plot, svg
+from camviz.draw.marks import Marks
 from camviz.draw.panel import Panel, placed_image
 from camviz.draw.picture import png
 from camviz.draw.readout import true_minus
@@ -80,7 +81,7 @@ class Shades:
         return levels
 
 
-def heat(panel: Panel, name: str, values: Array, shades: Shades) -> tuple[str, dict[str, bytes]]:
+def heat(panel: Panel, name: str, values: Array, shades: Shades) -> tuple[Marks, dict[str, bytes]]:
     """Values (rows, columns), the outermost on the borders of the panel's data rectangle, as an attached picture.
 
     Between the values the colours follow straight lines; a NaN leaves the place around it bare.
@@ -96,7 +97,7 @@ def heat(panel: Panel, name: str, values: Array, shades: Shades) -> tuple[str, d
     return svg.image(name, 0, 0, panel.width, panel.height), {name: png(colours)}
 
 
-def contours(panel: Panel, values: Array, shades: Shades, unit: str = "", strong: float | None = None) -> str:
+def contours(panel: Panel, values: Array, shades: Shades, unit: str = "", strong: float | None = None) -> Marks:
     """Lines at the bar's numbers, each with its own, through values (rows, columns) that span the panel's rectangle.
 
     The level `strong` has a thicker line.
@@ -108,7 +109,7 @@ def contours(panel: Panel, values: Array, shades: Shades, unit: str = "", strong
     with np.errstate(divide="ignore", invalid="ignore"):
         heights, cuts = (np.log(values), np.log(levels)) if shades.logarithmic else (values, levels)
     generator = contour_generator(u, v, np.ma.masked_invalid(heights))
-    drawn, names = "", ""
+    drawn, names = svg.NOTHING, svg.NOTHING
     for i, (level, cut) in enumerate(zip(levels, cuts, strict=True)):
         lines = [panel.place(line) for line in generator.lines(cut)]
         lines = [line for line in lines if np.ptp(line, axis=0).max() > _SPECK]
@@ -118,7 +119,7 @@ def contours(panel: Panel, values: Array, shades: Shades, unit: str = "", strong
     return drawn + names
 
 
-def bar(x: float, y: float, height: float, name: str, shades: Shades, title: str) -> tuple[str, dict[str, bytes]]:
+def bar(x: float, y: float, height: float, name: str, shades: Shades, title: str) -> tuple[Marks, dict[str, bytes]]:
     """An upright colour bar with its numbers to the right, what it counts in words above, and its attached picture."""
     with np.errstate(over="ignore"):
         t = np.linspace(1, 0, 128)
@@ -127,7 +128,7 @@ def bar(x: float, y: float, height: float, name: str, shades: Shades, title: str
             values = shades.low * (shades.high / shades.low) ** t
     levels = shades.levels()
     at = y + height * (1 - shades.fraction(levels))
-    ticks = "".join(
+    ticks = svg.join(
         svg.text((x + 20, place + 4), true_minus(f"{level:g}"), "tick")
         for place, level in zip(at, np.round(levels, 9) + 0.0, strict=True)
     )
@@ -156,13 +157,20 @@ def heat_key(colours: str) -> bytes:
 
 
 def heat_panel(
-    panel: Panel, width: int, height: int, low: float, high: float, unit: str, marks: str = "", **heading: str
-) -> str:
+    panel: Panel,
+    width: int,
+    height: int,
+    low: float,
+    high: float,
+    unit: str,
+    marks: Marks = svg.NOTHING,
+    **heading: str,
+) -> Marks:
     """The map attached under the panel's name, of so many pixels, hatched where it has none, and its key at the right.
 
     The key is attached as "NAME key". `marks` are drawn over the map, `heading` is what `Panel.show` takes.
     """
-    content = _hatching(panel) + placed_image(panel, panel.name, width, height, style="image-rendering:pixelated")
+    content = _hatching(panel) + placed_image(panel, panel.name, width, height, image_rendering="pixelated")
     x = panel.x + panel.width + _GAP
     key = svg.image(f"{panel.name} key", x, panel.y, _BAR, panel.height)
     key += svg.rectangle(x, panel.y, _BAR, panel.height, "frame")
@@ -172,27 +180,27 @@ def heat_panel(
     if words:
         words[-1] += f" {unit}"
     labels = [svg.text((x + _BAR + 4, y + 4), one, "tick") for y, one in zip(places, words, strict=True)]
-    return panel.show(content + marks, **heading) + key + "".join(labels)
+    return panel.show(content + marks, **heading) + key + svg.join(labels)
 
 
-def _hatching(panel: Panel) -> str:
+def _hatching(panel: Panel) -> Marks:
     along = np.arange(-panel.height, panel.width, 9.0)
     starts = np.stack([along, np.full_like(along, panel.height)], axis=-1)
     return svg.segments(starts, starts + (panel.height, -panel.height), "grid")
 
 
-def _named(panel: Panel, lines: list[Array], words: str, turn: int) -> str:
+def _named(panel: Panel, lines: list[Array], words: str, turn: int) -> Marks:
     """A label on the longest of a level's lines, where it stays inside the panel and off its neighbours' labels."""
     if not lines:
-        return ""
+        return svg.NOTHING
     line = max(lines, key=len)
     if np.ptp(line, axis=0).max() < 60:  # an island that its own label would cover
-        return ""
+        return svg.NOTHING
     inside = line[
         (line[:, 0] > 14) & (line[:, 0] < panel.width - 14) & (line[:, 1] > 16) & (line[:, 1] < panel.height - 8)
     ]
     if not len(inside):
-        return ""
+        return svg.NOTHING
     at = inside[int((0.15 + 0.19 * turn) % 1 * len(inside))]
     return svg.text(at + (0, 4), words, "label halo middle")
 

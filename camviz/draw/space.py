@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from camviz.draw.items import Dots, Face, Item, Label, Line, TexturedMesh, axes_triad, camera_body, grid_lines
+from camviz.draw.marks import Marks
 from camviz.draw.orbit_camera import OrbitCamera
 from camviz.draw.panel import Panel
 from camviz.draw.wire import Viewport, draw_wire
@@ -48,7 +49,7 @@ def draw_space(
     renderer: str | None = None,
     frame: RigidTransform | None = None,
     scenery: tuple[Item, ...] = (),
-) -> tuple[str, dict[str, bytes]]:
+) -> tuple[Marks, dict[str, bytes]]:
     """The content of a panel, and the photographs it needs.
 
     Solid and wireframe pictures show the same points at the same places. Unless `renderer` says which, it is solid

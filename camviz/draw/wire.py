@@ -15,6 +15,7 @@ import numpy as np
 from camviz.cameras import Camera
 from camviz.draw import svg
 from camviz.draw.items import Dots, Face, Item, Label, Line, TexturedMesh
+from camviz.draw.marks import NOTHING, Marks, Segments, join
 from camviz.draw.picture import png
 from camviz.draw.sheets import warp
 from camviz.lenses.base import Array
@@ -63,12 +64,12 @@ class Pieces:
     hidden: np.ndarray
 
 
-Fill = tuple[float, str, dict[str, bytes]]  # depth, fragment, attached pictures
+Fill = tuple[float, Marks, dict[str, bytes]]  # depth, marks, attached pictures
 
 
 def draw_wire(
     viewport: Viewport, items: Sequence[Item], name: str, scale: float = 1, scenery: tuple[Item, ...] = ()
-) -> tuple[str, dict[str, bytes]]:
+) -> tuple[Marks, dict[str, bytes]]:
     """Everything, farther things first (the painter's algorithm); pictures are called `name`-0, `name`-1, …
 
     What is seen of the `scenery`, things that do not change, is kept while the onlooker stands still.
@@ -79,18 +80,18 @@ def draw_wire(
     behind, lines = _lines(scenery), _lines(items)
     pieces = _joined(stage, len(behind), cut(viewport, lines, nothing_hides, fine=False))
     strokes = _strokes(viewport, [*behind, *lines], pieces, depths)
-    layers = [strokes.get(0, "")]
-    for i, (_, fragment, _) in enumerate(fills):
-        layers += [fragment, strokes.get(i + 1, "")]
+    layers = [strokes.get(0, NOTHING)]
+    for i, (_, filled, _) in enumerate(fills):
+        layers += [filled, strokes.get(i + 1, NOTHING)]
     photographs = {key: data for _, _, attached in fills for key, data in attached.items()}
-    return "".join(layers) + draw_marks(viewport, [*scenery, *items]), photographs
+    return join(layers) + draw_marks(viewport, [*scenery, *items]), photographs
 
 
-def draw_lines(viewport: Viewport, items: Sequence[Item], hidden: Hidden = nothing_hides) -> str:
+def draw_lines(viewport: Viewport, items: Sequence[Item], hidden: Hidden = nothing_hides) -> Marks:
     """The lines alone, faint where something solid hides them."""
     lines = _lines(items)
     pieces = cut(viewport, lines, hidden, fine=hidden is not nothing_hides)
-    return "".join(_strokes(viewport, lines, pieces, np.empty(0)).values())
+    return join(_strokes(viewport, lines, pieces, np.empty(0)).values())
 
 
 @lru_cache(maxsize=4)
@@ -102,25 +103,25 @@ def _lines(items: Sequence[Item]) -> list[Line]:
     return [item for item in items if isinstance(item, Line)]
 
 
-def _strokes(viewport: Viewport, lines: Sequence[Line], pieces: Pieces, depths: Array) -> dict[int, str]:
+def _strokes(viewport: Viewport, lines: Sequence[Line], pieces: Pieces, depths: Array) -> dict[int, Marks]:
     """The lines, keyed by how many of the filled things at `depths` (descending) they come after."""
     slot = np.searchsorted(-depths, -0.98 * pieces.depth, side="left")
     level = np.where(pieces.hidden, -1, viewport.strength(pieces.depth))
     pens = {pen: i for i, pen in enumerate(dict.fromkeys((line.class_, line.width) for line in lines))}
     pen = np.array([pens[line.class_, line.width] for line in lines], dtype=int)[pieces.line]
     key = (slot * (LEVELS + 1) + level + 1) * len(pens) + pen
-    layers: dict[int, str] = {}
+    layers: dict[int, Marks] = {}
     names = list(pens)
-    for group, data in _path_data(pieces, key):
+    for group, ends, continues in _joined_strokes(pieces, key):
         rest, which = divmod(group, len(pens))
         slot_, strength = divmod(rest, LEVELS + 1)
-        layers[slot_] = layers.get(slot_, "") + _stroke(data, *names[which], strength - 1)
+        layers[slot_] = layers.get(slot_, NOTHING) + [_stroke(ends, continues, *names[which], strength - 1)]
     last = max(layers, default=0)
-    layers[last] = layers.get(last, "") + "".join(_heads(viewport, lines))
+    layers[last] = layers.get(last, NOTHING) + join(_heads(viewport, lines))
     return layers
 
 
-def draw_marks(viewport: Viewport, items: Sequence[Item], hidden: Hidden = nothing_hides) -> str:
+def draw_marks(viewport: Viewport, items: Sequence[Item], hidden: Hidden = nothing_hides) -> Marks:
     """Dots and labels, over everything else; dots that something hides are faint."""
     parts = []
     for item in items:
@@ -134,7 +135,7 @@ def draw_marks(viewport: Viewport, items: Sequence[Item], hidden: Hidden = nothi
         if isinstance(item, Label):
             px = viewport.place(viewport.points_cam(item.point))
             parts.append(svg.text(px + (0, 4.5), item.words, f"{item.class_} halo middle"))
-    return "".join(parts)
+    return join(parts)
 
 
 def cut(viewport: Viewport, lines: Sequence[Line], hidden: Hidden, fine: bool) -> Pieces:
@@ -192,15 +193,15 @@ def _pyramid(viewport: Viewport) -> Array:
     return np.array([(0, 0, 1, NEAR), (1, 0, x, 0), (-1, 0, x, 0), (0, 1, y, 0), (0, -1, y, 0)])
 
 
-def _stroke(data: str, class_: str, width: float, level: int) -> str:
+def _stroke(ends: Array, continues: np.ndarray, class_: str, width: float, level: int) -> Segments:
     nearness = max(level, 0) / (LEVELS - 1)
     opacity = 0.16 if level < 0 else 0.55 + 0.45 * nearness
-    style = f"stroke-width:{width * (0.75 + 0.5 * nearness):.2f};stroke-opacity:{opacity:.2f}"
-    return svg.element("path", d=data, class_=class_, style=style)
+    style = {"stroke_width": round(width * (0.75 + 0.5 * nearness), 2), "stroke_opacity": round(opacity, 2)}
+    return Segments(ends.reshape(-1, 2, 2), class_, continues, style)
 
 
-def _path_data(pieces: Pieces, key: np.ndarray) -> Iterator[tuple[int, str]]:
-    """Of all pieces with one key, in ascending order of keys: the key, and their path data.
+def _joined_strokes(pieces: Pieces, key: np.ndarray) -> Iterator[tuple[int, Array, np.ndarray]]:
+    """Of all pieces with one key, in ascending order of keys: the key, strokes (n, 4), and which (n,) continue another.
 
     Consecutive pieces of one segment become one stroke, strokes that touch become one line.
     """
@@ -213,16 +214,12 @@ def _path_data(pieces: Pieces, key: np.ndarray) -> Iterator[tuple[int, str]]:
     strokes = np.concatenate([pieces.ends[order[firsts], 0], pieces.ends[order[lasts], 1]], axis=-1).round(1)
     key = key[firsts]
     touches = np.concatenate([~_YES, (strokes[1:, :2] == strokes[:-1, 2:]).all(axis=-1) & (key[1:] == key[:-1])])
-    words = [
-        f"L{c:g},{d:g}" if touch else f"M{a:g},{b:g}L{c:g},{d:g}"
-        for (a, b, c, d), touch in zip(strokes.tolist(), touches.tolist(), strict=True)
-    ]
     starts = np.flatnonzero(np.concatenate([_YES, key[1:] != key[:-1]])).tolist()
-    for start, end in zip(starts, [*starts[1:], len(words)], strict=True):
-        yield int(key[start]), "".join(words[start:end])
+    for start, end in zip(starts, [*starts[1:], len(strokes)], strict=True):
+        yield int(key[start]), strokes[start:end], touches[start:end]
 
 
-def _heads(viewport: Viewport, lines: Sequence[Line]) -> Iterator[str]:
+def _heads(viewport: Viewport, lines: Sequence[Line]) -> Iterator[Marks]:
     """Arrow heads, shorter where the arrow points towards the eye or away from it."""
     arrows = [line for line in lines if line.head]
     if not arrows:
@@ -276,10 +273,11 @@ def _sheet(
     return float(np.nanmean(points_cam[:, 2])), svg.image(name, *rectangle), {name: png(pixels)}
 
 
-def _fill(px: Array, face: Face) -> str:
-    themed = not face.colour.startswith("#")
-    style = f"fill-opacity:{min(face.opacity, 0.8):.2g}" + ("" if themed else f";fill:{face.colour}")
-    return svg.polygon(px, f"fill-{face.colour}" if themed else "face", style=style)
+def _fill(px: Array, face: Face) -> Marks:
+    opacity = round(min(face.opacity, 0.8), 2)
+    if face.colour.startswith("#"):
+        return svg.polygon(px, "face", fill_opacity=opacity, fill=face.colour)
+    return svg.polygon(px, f"fill-{face.colour}", fill_opacity=opacity)
 
 
 def _cut_near(vertices: Array) -> Array:

@@ -12,14 +12,15 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from camviz.draw.flow import Cell, Tile
+from camviz.draw.flow import Cell, Part, Tile
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.orbit_camera import OrbitCamera
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
 from camviz.draw.space import Item, draw_space
 from camviz.views.yours import Function, answered, without  # noqa: F401 - asked for here, beside the base of views
 
-Drawn = tuple[str, dict[str, bytes]]
+Drawn = tuple[Marks, dict[str, bytes]]
 """A part of a picture, and the photographs that it needs."""
 ORBIT_HANDLES = ("eye", "orbit")
 
@@ -114,7 +115,7 @@ class View:
     def tiled(
         self,
         layout: Mapping[str, Cell],
-        parts: Mapping[str, str],
+        parts: Mapping[str, Part],
         attached: Mapping[str, bytes] | None = None,
         described: str | None = None,
     ) -> Picture:
@@ -217,7 +218,7 @@ class OrbitView(View):
         *,
         eye: OrbitCamera | None = None,
         scenery: tuple[Item, ...] = (),
-        over: str = "",
+        over: Marks = NOTHING,
         **heading: str,
     ) -> Drawn:
         """A panel with things in wireframe, seen by `eye` or the field; marks `over` them; `heading` is for `show`."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from camviz import twoview
 from camviz.draw import plot, svg
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel
 from camviz.lenses.base import Array
 
@@ -19,7 +20,7 @@ def wedge_panel(
     notes: tuple[str, str],
     *,
     worth: bool = True,
-) -> str:
+) -> Marks:
     """The panel at `place` (x, y, width, height), along the left camera's ray of the point, out to `farthest` metres.
 
     The right camera's pixel is a wedge, `plus_minus` pixels to either side, that meets the left ray between the
@@ -33,8 +34,8 @@ def wedge_panel(
     # The ray of the disparity's lower end runs from the right camera at (0, B) by (d - e) / f across for each metre.
     end = min(far, 2 * right)
     edge = (end, B - end * (disparity - plus_minus) / f)
-    wedge = svg.polygon(panel.place([(0, B), edge, (end, 0), (near, 0)]), "wash fill-orange") if worth else ""
-    sides = svg.path([panel.place([(0, B), tip]) for tip in ((near, 0), edge)], "orange thin") if worth else ""
+    wedge = svg.polygon(panel.place([(0, B), edge, (end, 0), (near, 0)]), "wash fill-orange") if worth else NOTHING
+    sides = svg.path([panel.place([(0, B), tip]) for tip in ((near, 0), edge)], "orange thin") if worth else NOTHING
     named, words = (right, "blue halo end") if right / 2 > Z else (0, "blue halo")  # where the orange ray is not
     error = _error(panel, f * B, right, B, (near, min(far, right)), notes[1]) if worth else ""
     content = (
@@ -54,7 +55,9 @@ def wedge_panel(
     return plot.axes(panel, "Z in metres", "x in metres") + panel.show(content, title=title)
 
 
-def _error(panel: Panel, focal_baseline: float, right: float, B: float, between: tuple[float, float], note: str) -> str:
+def _error(
+    panel: Panel, focal_baseline: float, right: float, B: float, between: tuple[float, float], note: str
+) -> Marks:
     """The comb, the piece of the left ray that the error leaves, and what that is in numbers."""
     near, far = between
     return (
@@ -65,7 +68,7 @@ def _error(panel: Panel, focal_baseline: float, right: float, B: float, between:
     )
 
 
-def _comb(panel: Panel, focal_baseline: float, right: float, B: float) -> str:
+def _comb(panel: Panel, focal_baseline: float, right: float, B: float) -> Marks:
     """Teeth at the depths of the whole disparities, as long as they stand two picture units apart."""
     last = int((focal_baseline / 2 * panel.scale[0]) ** 0.5)  # Z² / (f B) is the gap
     depths: Array = focal_baseline / np.arange(1, 2 + last)

@@ -20,6 +20,7 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.draw import plot, svg
 from camviz.draw.flow import Cell, rows, shortened
 from camviz.draw.items import closed
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, true_minus
@@ -38,7 +39,7 @@ _RADIAL: dict[str, Any] = {"low": -1.0, "high": 1.0, "step": 0.005}
 _SIDE: dict[str, Any] = {"low": -0.1, "high": 0.1, "step": 0.001}
 _SAMPLES = {True: 25, False: 65}  # of a line of the grid and a side of the contours' grid: in drafts, in fine pictures
 _LEVELS = np.array([1, 2, 5, 10, 20, 40, 80, 160, 320])
-_BRIGHT = "stroke:#f2c94c"  # on a photograph, in every theme
+_BRIGHT = {"stroke": "#f2c94c"}  # on a photograph, in every theme
 _TILES = {  # of the panels
     "picture": "the picture",
     "yours": "with your function",
@@ -294,20 +295,20 @@ class DistortionView(OrbitView):
         panel = self._image_panel("picture", cell)
         straight = _grid_lines(self.intrinsics, _SAMPLES[draft])
         lines = self._bend(straight) if self.show == "distorted" else straight
-        drawn = self._over(panel, lines, "thin", style=_BRIGHT)
+        drawn = self._over(panel, lines, "thin", **_BRIGHT)
         title = "What the camera sees" if self.show == "distorted" else "Straightened"
-        fold = self._fold_circle(panel, bent=self.show == "distorted") if self._has(_GRID) else ""
+        fold = self._fold_circle(panel, bent=self.show == "distorted") if self._has(_GRID) else NOTHING
         shown = self._photograph(panel, "camera") + drawn + fold
         return panel.show(shown, title=title), {"camera": jpeg(self.image(draft=draft))}
 
-    def _over(self, panel: Panel, lines: np.ndarray, kind: str, **style: Any) -> str:
+    def _over(self, panel: Panel, lines: np.ndarray, kind: str, **style: Any) -> Marks:
         """The lines of the grid over a picture, where the grid is open."""
-        return svg.path(panel.place(self.intrinsics.to_pixels(lines)), kind, **style) if self._has(_GRID) else ""
+        return svg.path(panel.place(self.intrinsics.to_pixels(lines)), kind, **style) if self._has(_GRID) else NOTHING
 
     def _image_panel(self, name: str, cell: Cell) -> Panel:
         return image_in(cell, name, self.intrinsics.width, self.intrinsics.height)
 
-    def _photograph(self, panel: Panel, attached: str) -> str:
+    def _photograph(self, panel: Panel, attached: str) -> Marks:
         return placed_image(panel, attached, self.intrinsics.width, self.intrinsics.height)
 
     # The reader's own function ---------------------------------------------------------------------------------------
@@ -344,10 +345,10 @@ class DistortionView(OrbitView):
             return self._taken(draft, "yours")
         return self._fetched(self._taken(draft), lambda xy: self._bend(written.straightened(xy)))
 
-    def _fold_circle(self, panel: Panel, *, bent: bool) -> str:
+    def _fold_circle(self, panel: Panel, *, bent: bool) -> Marks:
         """Where the radial curve turns back, among ideal points or, `bent`, where the lens puts them."""
         if not isfinite(self._fold_angle if bent else self._fold):
-            return ""
+            return NOTHING
         rim = self._fold_rim(90) if bent else self._fold * _circle(90)
         return svg.line(panel.place(self.intrinsics.to_pixels(closed(rim))), "red dashed")
 
@@ -373,7 +374,7 @@ class DistortionView(OrbitView):
         )
         return panel.show(content, title="Each point goes to its dot", note="contours: px"), {}
 
-    def _contours(self, panel: Panel, samples: int) -> str:
+    def _contours(self, panel: Panel, samples: int) -> Marks:
         uv = _pixel_grid(self.intrinsics, samples)
         contours = contour_generator(uv[..., 0], uv[..., 1], np.ma.masked_invalid(self.moved(uv)))
         lines = {level: [panel.place(line) for line in contours.lines(level)] for level in _LEVELS}
@@ -382,14 +383,14 @@ class DistortionView(OrbitView):
             for i, (level, drawn) in enumerate(lines.items())
             for line in drawn[:1]
         ]
-        return svg.path([line for drawn in lines.values() for line in drawn], "muted thin") + "".join(names)
+        return svg.path([line for drawn in lines.values() for line in drawn], "muted thin") + svg.join(names)
 
-    def _folded_area(self, panel: Panel, samples: int) -> str:
+    def _folded_area(self, panel: Panel, samples: int) -> Marks:
         uv = _pixel_grid(self.intrinsics, samples)
         xy = self.intrinsics.from_pixels(uv)
         folded = ~np.isfinite(self.camera.lens.project(on_plane(xy))[..., 0])
         outlines = contour_generator(uv[..., 0], uv[..., 1], folded.astype(float)).filled(0.5, 1.5)
-        return "".join(svg.polygon(panel.place(outline), "wash fill-red") for outline in outlines[0])
+        return svg.join(svg.polygon(panel.place(outline), "wash fill-red") for outline in outlines[0])
 
     # The radial curve ------------------------------------------------------------------------------------------------
 
@@ -399,7 +400,7 @@ class DistortionView(OrbitView):
 
     def curve_panel(
         self, x: float, y: float, width: float, height: float, *, equation: bool = True, samples: int = 241
-    ) -> str:
+    ) -> Marks:
         """The radial curve g(r), where it folds and where the picture ends; `x` and `y` are its plot's corner."""
         corner = distortion.image_corner_radius(self.intrinsics) or 1.0  # a single pixel on the axis has none
         top = 1.5 * corner
@@ -424,9 +425,9 @@ class DistortionView(OrbitView):
             note=self.equation() if equation else "",
         )
 
-    def _your_curve(self, panel: Panel, r: np.ndarray) -> str:
+    def _your_curve(self, panel: Panel, r: np.ndarray) -> Marks:
         if self.yours is None:
-            return ""
+            return NOTHING
         distorted, _ = self._your_bend(np.stack([r, np.zeros_like(r)], axis=-1))
         return plot.curve(panel, r, distorted[..., 0], "orange dashed")
 
@@ -436,9 +437,9 @@ class DistortionView(OrbitView):
             return lens.radial(r)
         return lens.project(np.stack([r, 0 * r, np.ones_like(r)], axis=-1))[..., 0]
 
-    def _fold_mark(self, panel: Panel, fold: float) -> str:
+    def _fold_mark(self, panel: Panel, fold: float) -> Marks:
         if not fold < panel.right:
-            return ""
+            return NOTHING
         at = panel.place([fold, float(self._radial(np.array(fold)))])
         free = (np.clip(at[0] - 8, 165, 0.68 * panel.width), 17)  # at the top, left of the line of no distortion
         return svg.dots([at], "red", 9) + svg.text(free, f"folds at r = {_with_angle(fold)}", "red end halo")
@@ -477,7 +478,7 @@ class DistortionView(OrbitView):
         for i, (name, value) in enumerate(coefficients.items()):
             at = (x + 10 + 96 * (i // half), y + 50 + 18 * (i % half))
             drawn.append(svg.text(at, true_minus(f"{name} {value:+.4f}"), "number" if value else "number fill-muted"))
-        return "".join(drawn) + readout(self._told(), (x + 10, y + 64 + 18 * half), (0, 36), (0, 16)), {}
+        return svg.join(drawn) + readout(self._told(), (x + 10, y + 64 + 18 * half), (0, 36), (0, 16)), {}
 
 
 def _grid_lines(intrinsics: Intrinsics, samples: int) -> np.ndarray:

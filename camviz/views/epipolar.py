@@ -16,6 +16,7 @@ from camviz import twoview
 from camviz.cameras import Camera, transform
 from camviz.draw import svg
 from camviz.draw.flow import Cell, rows, shortened
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, true_minus
@@ -138,20 +139,20 @@ class EpipolarView(OrbitView, TwoCameras):
         away = float(twoview.line_distance(self.your_line, self.uv_right))
         return f"{away:.1f} px from the point" if np.isfinite(away) else "no line"
 
-    def _your_marks(self, panel: Panel) -> str:
+    def _your_marks(self, panel: Panel) -> Marks:
         """What the reader's functions draw: in the right picture lines and the place where they meet, dots on the left.
 
         Where they are not written yet, the right lines wait there in grey.
         """
         if self.F is None:
-            return ""
+            return NOTHING
         if panel.name == "left":
             pixels = panel.place(self._starred)
             return "" if self.your_lines is None else svg.dots(pixels, "paper-dot", 8) + svg.dots(pixels, "orange", 6)
-        drawn = self._marks_of_F(panel) if self.yours is not None else ""
-        return drawn + (self._star(panel) if self.your_lines is not None else "")
+        drawn = self._marks_of_F(panel) if self.yours is not None else NOTHING
+        return drawn + (self._star(panel) if self.your_lines is not None else NOTHING)
 
-    def _marks_of_F(self, panel: Panel) -> str:
+    def _marks_of_F(self, panel: Panel) -> Marks:
         F, problem = self.your_F
         if is_unwritten(problem):
             return self._waiting(panel, self.line[None])
@@ -170,7 +171,7 @@ class EpipolarView(OrbitView, TwoCameras):
         size = self.left.intrinsics
         return _STARRED * (size.width - 1, size.height - 1)
 
-    def _star(self, panel: Panel) -> str:
+    def _star(self, panel: Panel) -> Marks:
         """The lines of the reader's own function."""
         assert self.your_lines is not None
         assert self.F is not None
@@ -183,7 +184,7 @@ class EpipolarView(OrbitView, TwoCameras):
         is_a_line = np.isfinite(lines).all(axis=-1) & lines[:, :2].any(axis=-1)
         return on_photograph(panel.place(twoview.clip_lines(lines[is_a_line], self.right.intrinsics)), "orange dashed")
 
-    def _waiting(self, panel: Panel, lines: Array) -> str:
+    def _waiting(self, panel: Panel, lines: Array) -> Marks:
         """The right lines in grey, where the reader's will be."""
         drawn = on_photograph(panel.place(twoview.clip_lines(lines, self.right.intrinsics)), "muted dashed")
         return drawn + svg.text((panel.width / 2, 0.14 * panel.height), YOURS_HERE, "title halo middle")
@@ -283,7 +284,7 @@ class EpipolarView(OrbitView, TwoCameras):
         size = self.right.intrinsics
         return image_panel("right", 490, 34, _WIDTH, size.width, size.height, tallest=_TALLEST)
 
-    def _picture_panel(self, panel: Panel, camera: Camera, other: Camera, action: str) -> str:
+    def _picture_panel(self, panel: Panel, camera: Camera, other: Camera, action: str) -> Marks:
         content = placed_image(panel, panel.name, camera.intrinsics.width, camera.intrinsics.height)
         if self._has("right"):
             content += (
@@ -314,10 +315,10 @@ class EpipolarView(OrbitView, TwoCameras):
             self.drawn[panel.name] = svg.segments(lines[:, 0], lines[:, 1], "yellow thin half")
         return self.drawn[panel.name]
 
-    def _own_line(self, panel: Panel, camera: Camera) -> str:
+    def _own_line(self, panel: Panel, camera: Camera) -> Marks:
         """The epipolar line of the chosen point, and in the right picture strong where its ray can be seen."""
         if not self.baseline:
-            return ""
+            return NOTHING
         along, across = self._plane_axes(self.point - self.left.centre)
         whole = camera.project(camera.centre + _half_planes(along, np.stack([across, -across]), 90))
         lines = on_photograph(clipped(panel, panel.place(whole)), "green thin")
@@ -327,23 +328,23 @@ class EpipolarView(OrbitView, TwoCameras):
             lines += _infinity(panel.place(_inside(camera, ray[-1])))
         return lines
 
-    def _estimated_line(self, panel: Panel, camera: Camera) -> str:
+    def _estimated_line(self, panel: Panel, camera: Camera) -> Marks:
         if self.estimate is None:
-            return ""
+            return NOTHING
         F, uv = (self.estimate, [self.u, self.v]) if panel.name == "right" else (self.estimate.T, self.uv_right)
         line = panel.place(twoview.clip_lines(twoview.epipolar_lines(F, uv), camera.intrinsics))
         epipole = panel.place(_inside(camera, twoview.from_homogeneous(twoview.epipoles(F)[1])))
         return on_photograph([line], "purple dashed") + svg.dots([epipole], "purple", 9)
 
-    def _match_dots(self, panel: Panel) -> str:
+    def _match_dots(self, panel: Panel) -> Marks:
         if not self.noise:
-            return ""
+            return NOTHING
         seen = self.noisy_pairs[panel.name == "right"]
         return svg.dots(panel.place(seen), "paper-dot", 7) + svg.dots(panel.place(seen), "purple", 5)
 
-    def _epipole_mark(self, panel: Panel, camera: Camera, other: Camera) -> str:
+    def _epipole_mark(self, panel: Panel, camera: Camera, other: Camera) -> Marks:
         if not self.baseline or not self._has("epipoles"):
-            return ""
+            return NOTHING
         uv = _epipole(camera, other)
         at = panel.place(uv)
         if camera.intrinsics.contains(uv):
@@ -358,7 +359,7 @@ class EpipolarView(OrbitView, TwoCameras):
         depth = min(0.12, self.baseline / 4)
         return camera_outline(panel, camera, other, depth, "orange" if panel.name == "left" else "blue")
 
-    def _point_mark(self, panel: Panel, camera: Camera) -> str:
+    def _point_mark(self, panel: Panel, camera: Camera) -> Marks:
         at = panel.place([self.u, self.v] if panel.name == "left" else _inside(camera, self.uv_right))
         marks = ring(at, "red", 8) + svg.dots([at], "red", 5)
         if self.truth and np.isfinite(self.surface).all():
@@ -430,7 +431,7 @@ class EpipolarView(OrbitView, TwoCameras):
 
     # The numbers -----------------------------------------------------------------------------------------------------
 
-    def _numbers_block(self) -> str:
+    def _numbers_block(self) -> Marks:
         x, y, rows = self._layout["numbers"][0] + 22, self._layout["numbers"][1] + 18, list[str]()
         if self._has("F"):
             rows.append(svg.text((x, y), "F, of unit norm" if self.F is not None else "No F here", "title"))
@@ -442,7 +443,7 @@ class EpipolarView(OrbitView, TwoCameras):
         if self.yours is not None and self.F is not None and figures:
             yours, below = {"your line": self._your_figure()}, y + 19 * len(figures)
             rows.append(readout(yours, (x, below), (0, 0), (112, 0), "label orange"))
-        return "".join(rows)
+        return svg.join(rows)
 
     def _details(self, images: dict[str, np.ndarray]) -> Drawn:
         """What the pictures show around the point, side by side: alike where the depth is that of the surface."""
@@ -486,11 +487,11 @@ def _far(uv: Array, camera: Camera) -> str:
     return "beyond the lens’s field" if camera.lens.is_distorted else "at infinity"
 
 
-def _infinity(at: Array) -> str:
+def _infinity(at: Array) -> Marks:
     return svg.dots([at], "green", 8) + svg.text(at + (0, -9), "∞", "green halo middle")
 
 
-def _notice(panel: Panel, words: str) -> str:
+def _notice(panel: Panel, words: str) -> Marks:
     """Words over a photograph, on a ground of the paper's colour."""
     ground = svg.rectangle(8, 8, panel.width - 16, 60, "paper")
     return ground + svg.paragraph((18, 28), words, panel.width - 36)

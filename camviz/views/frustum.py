@@ -16,6 +16,7 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics, transform
 from camviz.draw import svg
 from camviz.draw.flow import Cell, rows
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.matrix import matrix
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture
@@ -199,7 +200,7 @@ class FrustumView(OrbitView):
 
     def figure(self, *, draft: bool = False) -> Picture:
         image, taken = garden.drafted(self.camera) if draft else garden.taken(self.camera, garden.FINE)
-        parts: dict[str, str] = {}
+        parts: dict[str, Marks] = {}
         photographs = {"camera": taken}
         if self._has("world"):
             parts["world"], attached = self._world_panel(image, draft)
@@ -238,11 +239,11 @@ class FrustumView(OrbitView):
         content += self._your_numbers(panel)
         return panel.show(content, title=title, hint="drag to turn", drag="eye", label=label), photographs
 
-    def _whereabouts(self, panel: Panel, centre: Array) -> str:
+    def _whereabouts(self, panel: Panel, centre: Array) -> Marks:
         """An arrow towards the camera's centre (3,) where that is out of the panel."""
         onlooker = self.eye.camera(int(panel.width), int(panel.height))
         if onlooker.sees(centre):
-            return ""
+            return NOTHING
         return border_arrow(panel, unit(transform(onlooker.cam_from_world, centre)[:2]), "the camera is this way")
 
     def _items(self, image: np.ndarray) -> list[Item]:
@@ -260,24 +261,26 @@ class FrustumView(OrbitView):
             items.append(Dots(self._pivot, "purple", 8))
         return items
 
-    def _picture_panel(self) -> str:
+    def _picture_panel(self) -> Marks:
         (x, y, across, high), k = self._layout["picture"], self.camera.intrinsics
         panel = image_panel("picture", x + 10, y + 34, across - 20, k.width, k.height, tallest=high - 44)
-        content = placed_image(panel, "camera", k.width, k.height) + (self._projected(panel) if self.points else "")
+        content = placed_image(panel, "camera", k.width, k.height) + (
+            self._projected(panel) if self.points else NOTHING
+        )
         label = "What the camera sees; drag it, or press the arrow keys, to turn the camera"
         return panel.show(content, title="What it sees", hint="drag to look around", drag="picture", label=label)
 
-    def _projected(self, panel: Panel) -> str:
+    def _projected(self, panel: Panel) -> Marks:
         marks = self.marks.split()
-        corners = self._corners(panel) + self._your_corners(panel) if "corners" in marks else ""
-        return corners + (self._axes(panel) if "axes" in marks else "")
+        corners = self._corners(panel) + self._your_corners(panel) if "corners" in marks else NOTHING
+        return corners + (self._axes(panel) if "axes" in marks else NOTHING)
 
-    def _corners(self, panel: Panel) -> str:
+    def _corners(self, panel: Panel) -> Marks:
         uv = panel.place(self.camera.project(board_corners()))
         spacing = float(np.linalg.norm(uv[1] - uv[0]))
         return svg.dots(uv, "red", float(np.clip(0.35 * spacing, 1, 5)) if np.isfinite(spacing) else 4)
 
-    def _axes(self, panel: Panel) -> str:
+    def _axes(self, panel: Panel) -> Marks:
         """The world's axes where the camera sees them, each with its name at the last place in the picture."""
         lines, names = "", ""
         for name, axis, colour in zip("XYZ", np.eye(3), ("orange", "green", "blue"), strict=True):
@@ -288,18 +291,18 @@ class FrustumView(OrbitView):
                 names += svg.text(inside[-1] + (8, -8), name, f"label halo {colour}")
         return lines + names
 
-    def _your_corners(self, panel: Panel) -> str:
+    def _your_corners(self, panel: Panel) -> Marks:
         """The board's corners where the reader's camera would see them."""
         if self._your_camera is None or self.your_centre[1]:
-            return ""
+            return NOTHING
         uv = self._your_camera.project(board_corners())
         return svg.dots(panel.place(np.where(self.camera.intrinsics.contains(uv)[:, None], uv, np.nan)), "orange", 3.5)
 
-    def _numbers(self) -> dict[str, str]:
+    def _numbers(self) -> dict[str, Marks]:
         """The tiles of numbers, by name."""
         n, from_sliders = self.numbers(), " ← x, y, z"
         corners = {name: (x + 10, y + 18) for name, (x, y, _, _) in self._layout.items()}
-        parts: dict[str, str] = {}
+        parts: dict[str, Marks] = {}
         if self._has("numbers"):
             centre = "C = −Rᵀt [m]" if self._has("point") else "C [m]"
             (x, y), held = corners["position"], self.mode
@@ -313,10 +316,10 @@ class FrustumView(OrbitView):
             parts["one point"] = self._chain(*corners["one point"])
         return parts
 
-    def _your_numbers(self, panel: Panel) -> str:
+    def _your_numbers(self, panel: Panel) -> Marks:
         """The reader's centre and its distance from the right one, or why there is none, in a corner of the world."""
         if self.yours is None:
-            return ""
+            return NOTHING
         (centre, problem), x, y = self.your_centre, 14, 24
         if problem:
             return svg.paragraph((x, y), problem, panel.width - 2 * x)
@@ -324,7 +327,7 @@ class FrustumView(OrbitView):
         where = svg.text((x, y), f"your C: {vector(centre, 2)} m", "label halo orange")
         return where + svg.text((x, y + 20), f"{away:.2f} m from the camera", "label halo orange")
 
-    def _chain(self, x: float, y: float) -> str:
+    def _chain(self, x: float, y: float) -> Marks:
         """One point, step by step, from (x, y) on."""
         point = board_corners()[0]
         seen_at = self.camera.project(point)

@@ -8,11 +8,12 @@ from numpy.typing import ArrayLike
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
+from camviz.draw.marks import Marks
 from camviz.draw.panel import Panel
 from camviz.lenses.base import Array
 
 
-def border_arrow(panel: Panel, toward: Array, words: str) -> str:
+def border_arrow(panel: Panel, toward: Array, words: str) -> Marks:
     """An arrow at the panel's border that points out of it along `toward` (2,), and what lies there."""
     centre = np.array([panel.width, panel.height]) / 2
     half = np.maximum(centre - 14, 1)
@@ -25,7 +26,7 @@ def border_arrow(panel: Panel, toward: Array, words: str) -> str:
     return arrow + svg.text(tip + (-14 * np.sign(toward[0]) * (side != "middle"), below), words, f"label halo {side}")
 
 
-def camera_outline(panel: Panel, camera: Camera, other: Camera, depth: float, class_: str) -> str:
+def camera_outline(panel: Panel, camera: Camera, other: Camera, depth: float, class_: str) -> Marks:
     """The body of another camera, `depth` metres deep, where it is in this one's picture."""
     _, rim = other.frustum(0, depth, 1)
     spokes = np.stack([np.broadcast_to(other.centre, (4, 3)), rim], axis=1)
@@ -46,11 +47,11 @@ def clipped(panel: Panel, lines: ArrayLike) -> Array:
     return starts[:, None] + parts[..., None] * along[:, None]
 
 
-def on_photograph(lines: ArrayLike, class_: str) -> str:
+def on_photograph(lines: ArrayLike, class_: str) -> Marks:
     """Lines (m, n, 2) with an edge in the colour of the paper."""
     lines = np.asarray(lines, dtype=float)
     if lines.shape[1:] == (2, 2):
-        return "".join(svg.segments(lines[:, 0], lines[:, 1], c) for c in ("paper-line", class_))
+        return svg.join(svg.segments(lines[:, 0], lines[:, 1], c) for c in ("paper-line", class_))
     return svg.path(lines, "paper-line") + svg.path(lines, class_)
 
 
@@ -68,7 +69,7 @@ def shortened(starts: ArrayLike, ends: ArrayLike, longest: float) -> tuple[np.nd
     return starts + (ends - starts) * share[:, None], cut
 
 
-def arrows(starts: ArrayLike, ends: ArrayLike, class_: str, head: float = 6) -> str:
+def arrows(starts: ArrayLike, ends: ArrayLike, class_: str, head: float = 6) -> Marks:
     """Arrows between places (n, 2) in the panel, with an edge in the colour of the paper and a head of their size."""
     starts, ends = (np.asarray(places, dtype=float).reshape(-1, 2) for places in (starts, ends))
     along = ends - starts
@@ -80,10 +81,10 @@ def arrows(starts: ArrayLike, ends: ArrayLike, class_: str, head: float = 6) -> 
     shafts = np.stack([starts, ends], axis=1)
     known = np.isfinite(barbs).all(axis=(1, 2))
     data = np.concatenate([shafts[known], barbs[known][:, :2], barbs[known][:, 1:]])
-    return "".join(svg.segments(data[:, 0], data[:, 1], c) for c in ("paper-line", class_))
+    return svg.join(svg.segments(data[:, 0], data[:, 1], c) for c in ("paper-line", class_))
 
 
-def cross(at: ArrayLike, class_: str, radius: float = 5) -> str:
+def cross(at: ArrayLike, class_: str, radius: float = 5) -> Marks:
     """Slanting crosses at places (n, 2) in the panel."""
     at = np.asarray(at, dtype=float).reshape(-1, 2)
     arm = radius * np.array([1, 1]), radius * np.array([1, -1])
@@ -91,7 +92,7 @@ def cross(at: ArrayLike, class_: str, radius: float = 5) -> str:
     return svg.segments(starts, ends, "paper-line") + svg.segments(starts, ends, class_)
 
 
-def ring(at: Array, class_: str, radius: float) -> str:
+def ring(at: Array, class_: str, radius: float) -> Marks:
     """A circle around a place (2,) in the panel."""
     return on_photograph([at + radius * circle(33)], class_)
 

@@ -9,6 +9,7 @@ from typing import Self
 import numpy as np
 
 from camviz.draw import plot, svg
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel
 from camviz.lenses.base import Array
 from camviz.views.base import Control, View, step_of
@@ -60,10 +61,10 @@ def places(count: int) -> tuple[Array, Array]:
     return x - 0.5 + gap, x + 0.5 - gap
 
 
-def bars_of(panel: Panel, values: Array, chosen: int = -1) -> str:
+def bars_of(panel: Panel, values: Array, chosen: int = -1) -> Marks:
     """A blue bar for each of the values (views,), and an orange one for that which is chosen, counted from 0."""
     marked = np.arange(len(values)) == chosen
-    return "".join(
+    return svg.join(
         plot.bars(panel, *places(len(values)), np.where(mask, values, np.nan), class_)
         for mask, class_ in ((~marked, "fill-blue"), (marked, "fill-orange"))
     )
@@ -80,7 +81,7 @@ def ceiling(values: Array) -> float:
     return 1.2 * max(float(whole.max(initial=0.0)), 1e-9)
 
 
-def figures_on(panel: Panel, values: Array) -> str:
+def figures_on(panel: Panel, values: Array) -> Marks:
     """Every value (views,) where its bar ends, where there is room for it; a bar that is cut has a break below it.
 
     A line behind a figure is interrupted by it.
@@ -93,15 +94,15 @@ def figures_on(panel: Panel, values: Array) -> str:
         svg.text((x, max(y - 4, 16)), f"{value:.2f}", "tick middle halo clear")
         for (x, y), value in zip(places_of, values, strict=True)
     ]
-    return svg.path(breaks, "paper-line cut") + "".join(figures if len(values) <= NAMED else ())
+    return svg.path(breaks, "paper-line cut") + svg.join(figures if len(values) <= NAMED else ())
 
 
-def figures_in(panel: Panel, values: Array) -> str:
+def figures_in(panel: Panel, values: Array) -> Marks:
     """Every value (views,) below the end of its bar, where both bars and names have room for it; NaN has none."""
     if len(values) > NAMED:
-        return ""
-    return "".join(
-        svg.text(panel.place((i + 1, value)) + (0, 14), f"{value:.2f}", "tick middle", style="fill:var(--paper)")
+        return NOTHING
+    return svg.join(
+        svg.text(panel.place((i + 1, value)) + (0, 14), f"{value:.2f}", "tick middle", fill="{paper}")
         for i, value in enumerate(values)
         if np.isfinite(value) and panel.height * min(value / panel.top, 1) > 20
     )

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from camviz.draw import prose, svg
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel
 from camviz.views.calls import as_arrays, attribute, contained, explain, stopped
 from camviz.views.patience import Patience, TimeIsUp
@@ -141,7 +142,9 @@ def answered(function: Function | None, arguments: tuple[Any, ...], like: Any) -
     return tried(function, arguments, like)
 
 
-def without(panel: Panel, problem: str, title: str, at: tuple[float, float] = (12, 26), right: str = "") -> str:
+def without(
+    panel: Panel, problem: str, title: str, at: tuple[float, float] = (12, 26), right: Marks = NOTHING
+) -> Marks:
     """The panel with the sentence that says why it is empty.
 
     Where the reader has written nothing yet and `right` is what a right function would show there, the panel shows that
@@ -149,7 +152,7 @@ def without(panel: Panel, problem: str, title: str, at: tuple[float, float] = (1
     """
     if right and is_unwritten(problem):
         words = svg.text((panel.width / 2, panel.height / 2), YOURS_HERE, "title halo middle")
-        return panel.show(svg.group(right, class_="awaited") + words, title=title)
+        return panel.show(svg.group(right, "awaited") + words, title=title)
     return panel.show(svg.paragraph(at, problem, panel.width - 2 * at[0]), title=title)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from camviz.cameras import transform
 from camviz.draw import svg
 from camviz.draw.items import Face, Item, Label, Line
+from camviz.draw.marks import Marks
 from camviz.draw.page import document
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
@@ -140,7 +141,7 @@ def accused(inspection: Inspection, name: str) -> list[int]:
     return [view for finding in inspection.findings if (finding.camera or alone) == name for view in finding.pictures]
 
 
-def _linked(case: Case, name: str, headed: bool, named: Sequence[int]) -> str:
+def _linked(case: Case, name: str, headed: bool, named: Sequence[int]) -> Marks:
     """The bars of all views, and of those `named` and the worst their pictures and boards, linked by `data-choose`.
 
     The first of those named is chosen at first, or the worst.
@@ -175,14 +176,14 @@ def worst_views(seen: Observations, named: Sequence[int] = ()) -> list[int]:
     return sorted([i for i in ranked if i < len(seen) and seen.shown[i]][:MOST_VIEWS])
 
 
-def _view_figure(view: ResidualsView, name: str, i: int) -> str:
+def _view_figure(view: ResidualsView, name: str, i: int) -> Marks:
     """One view's picture with its residuals, those on the board, and its figures."""
     k = view.observations.camera.intrinsics
     panel = image_panel(f"picture {i + 1}", 10, 34, 450, k.width, k.height, tallest=400)
     image, attached = view.picture_panel(panel)
     below = panel.y + panel.height + 34
     board = view.board_panel(space_panel(f"board {i + 1}", 10, below, 450, 170))
-    rows = "".join(
+    rows = svg.join(
         svg.text((10, below + 196 + 20 * j), a, "note") + svg.text((110, below + 196 + 20 * j), b, "label")
         for j, (a, b) in enumerate(view.numbers().items())
     )
@@ -220,12 +221,11 @@ def _boards(seen: Observations, name: str, links: Mapping[int, str]) -> Picture:
             Label(corners[0], names[i], "note"),
         ]
         lines, _ = draw_space(panel, group, eye, renderer="wire")
-        content += svg.element(
-            "a",
+        content += svg.group(
             lines,
+            "board",
             href=link,
             data_choose=i + 1,
-            class_="board",
             tabindex=-1,
             aria_label=f"the board of {seen.picture(i)}",
         )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import re
 from dataclasses import replace
 from html import escape
 
@@ -12,21 +11,15 @@ from PIL import Image
 from camviz.draw.picture import Picture
 
 QUALITY = 85  # of WebP, for photographs; maps and masks (PNG) keep every pixel
-_FITTED = re.compile(r'class="camviz-svg camviz-fitted"[^>]* viewBox="\S+ \S+ (\S+) (\S+)"')
 
 
 def embedded(picture: Picture) -> str:
-    """The flowing tiles as HTML, each of which knows its shape before it is drawn; photographs inside, as WebP.
+    """The flowing tiles as HTML, with their photographs inside, as WebP.
 
     `report.css` lets a browser draw a tile when it comes near the screen. It has its size before, so nothing moves.
-
-    >>> drawn = Picture.whole('<path d="M0,0h4"/>', 400, 300, "A line", "It is level.")
-    >>> 'viewBox="0 0 400 300" style="aspect-ratio:400/300"' in embedded(drawn)
-    True
     """
     photographs = {name: webp(data, QUALITY) for name, data in picture.photographs.items()}
-    markup = replace(picture, photographs=photographs).embedded()
-    return _FITTED.sub(r'\g<0> style="aspect-ratio:\1/\2"', markup)
+    return replace(picture, photographs=photographs).embedded()
 
 
 def figure(name: str, picture: Picture) -> str:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from camviz.cameras import Camera, transform
 from camviz.draw import svg
 from camviz.draw.flow import rows
+from camviz.draw.marks import Marks
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import readout, vector
@@ -216,19 +217,19 @@ class BoardPosesView(OrbitView):
         edge = rim(corners, "orange" if chosen else "muted", 1.8 if chosen else 1)
         return [edge, squares(corners, self.board)] if chosen else [edge]
 
-    def _image(self) -> str:
+    def _image(self) -> Marks:
         k = self.camera.intrinsics
         panel = image_panel("picture", 630, 34, 310, k.width, k.height, tallest=230)
         content = placed_image(panel, "photograph", k.width, k.height) if self.photographs else self._drawn(panel)
         title = f"Picture {self.index + 1}, corners computed"
         return panel.show(content + svg.dots(panel.place(self.pixels()), "red", 5), title=title)
 
-    def _drawn(self, panel: Panel) -> str:
+    def _drawn(self, panel: Panel) -> Marks:
         """The board's squares as lines, for want of a photograph."""
         grid = panel.place(self.pixels()).reshape(self.board.rows, self.board.columns, 2)
         return svg.path([*grid, *grid.swapaxes(0, 1)], "muted")
 
-    def _equation(self) -> str:
+    def _equation(self) -> Marks:
         n, chosen = self.numbers(), self.chosen
         figures = [
             ("rotation vector, axis · angle [rad]", vector(chosen.rotation.as_rotvec(), 3)),

@@ -11,6 +11,7 @@ import numpy as np
 from camviz.draw import svg
 from camviz.draw.flow import Sentences, rows
 from camviz.draw.items import Item, Label, Line, TexturedMesh
+from camviz.draw.marks import Marks
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
 from camviz.draw.shades import Shades, bar
@@ -150,7 +151,7 @@ class BoardResidualsView(OrbitView):
         parts = {"mean residuals": self._means_panel(), "bend": space, "in words": Sentences(self._solved())}
         return self.tiled(_LAYOUT, parts, sheets)
 
-    def _means_panel(self) -> str:
+    def _means_panel(self) -> Marks:
         seen, board = self.observations, self.observations.board
         left, top, right, bottom = board.area
         scale = min(455 / (right - left), 320 / (bottom - top))

@@ -11,6 +11,7 @@ import numpy as np
 
 from camviz.draw import svg
 from camviz.draw.flow import rows
+from camviz.draw.marks import Marks
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture, png
 from camviz.draw.readout import signed
@@ -109,17 +110,17 @@ class CorrelationView(View):
         panel = Panel("correlation", 130, 34, side, side, 0, n, 0, n)
         shown = np.abs(self.correlations) if self.show == "size only" else self.correlations
         shades = Shades(0, 1) if self.show == "size only" else Shades(-1, 1, diverging=True)
-        content = svg.image("matrix", 0, 0, side, side, style="image-rendering:pixelated")
+        content = svg.image("matrix", 0, 0, side, side, image_rendering="pixelated")
         if n <= _FIGURES:
             places = panel.place(np.stack(np.meshgrid(np.arange(n) + 0.5, np.arange(n) + 0.5), -1)).reshape(-1, 2)
             # The cells' colours are the same in both themes, and so are the words on them.
             lightness = shades.rgba(shown)[..., :3].astype(float).reshape(-1, 3) @ (0.299, 0.587, 0.114)
-            content += "".join(
+            content += svg.join(
                 svg.text(
                     place + (0, 4),
                     f"{r:.2f}" if self.show == "size only" else signed(r, 2),
                     "tick middle",
-                    style=f"fill:{'#14181f' if light > 140 else '#ffffff'}",
+                    fill="#14181f" if light > 140 else "#ffffff",
                 )
                 for place, r, light in zip(places, shown.ravel(), lightness, strict=True)
                 if np.isfinite(r)
@@ -129,16 +130,16 @@ class CorrelationView(View):
         parts = {"correlations": body, "numbers": self._words(680)}
         return self.tiled(_LAYOUT, parts, {"matrix": png(shades.rgba(shown)), **bar_picture})
 
-    def _names(self, panel: Panel, cell: float) -> str:
+    def _names(self, panel: Panel, cell: float) -> Marks:
         parts = []
         for i in range(0, len(self.names), ceil(_NAME / cell)):
             name = self.names[i]
             parts.append(svg.text((panel.x - 8, panel.y + (i + 0.5) * cell + 4), name, "tick end"))
             x, y = panel.x + (i + 0.5) * cell, panel.y + panel.height + 12
-            parts.append(svg.text((x, y), name, "tick end", transform=f"rotate(-55 {x:g} {y:g})"))
-        return "".join(parts)
+            parts.append(svg.text((x, y), name, "tick end", turned_deg=-55))
+        return svg.join(parts)
 
-    def _words(self, x: float) -> str:
+    def _words(self, x: float) -> Marks:
         words = svg.text((x, 48), "The strongest pairs", "title")
         for i, (a, b, r) in enumerate(self.strongest()[:9]):
             words += svg.text((x, 72 + 20 * i), signed(r, 2), "number" + (" red" if abs(r) > _STRONG else ""))

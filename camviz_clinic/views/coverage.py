@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from camviz.draw import plot, svg
 from camviz.draw.flow import Sentences, rows
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_panel
 from camviz.draw.picture import Picture, png
 from camviz.draw.shades import Shades, bar
@@ -97,7 +98,7 @@ class CoverageView(ObservedView):
         panel = image_panel("coverage", 20, 34, 440, k.width, k.height, tallest=340)
         shades = Shades(0, float(max(1, counts.max())))
         rgba = shades.rgba(np.where(counts > 0, counts, np.nan))
-        content = svg.image("counts", 0, 0, panel.width, panel.height, style="image-rendering:pixelated")
+        content = svg.image("counts", 0, 0, panel.width, panel.height, image_rendering="pixelated")
         corners = seen.detections[seen.used]
         content += svg.dots(panel.place(corners[:: max(1, len(corners) // _MOST_DOTS)]), "paper-dot", 2.5)
         content += self._figures(panel)
@@ -105,19 +106,19 @@ class CoverageView(ObservedView):
         shown = panel.show(content, title=f"{self.count.capitalize()} in every cell", note="bare: none")
         return shown + legend, {"counts": png(rgba), **bar_picture}
 
-    def _figures(self, panel: Panel) -> str:
+    def _figures(self, panel: Panel) -> Marks:
         """The counts as numbers, where the cells are large enough for them."""
         rows, columns = self.counts.shape
         if columns > 8:
-            return ""
-        return "".join(
+            return NOTHING
+        return svg.join(
             svg.text(
                 ((j + 0.5) * panel.width / columns, (i + 0.5) * panel.height / rows + 4), f"{n}", "label halo middle"
             )
             for (i, j), n in np.ndenumerate(self.counts)
         )
 
-    def _radius(self) -> str:
+    def _radius(self) -> Marks:
         edges, picture, corners = self.rings
         left, right, top = 100 * edges[:-1], 100 * edges[1:], 100 * max(picture.max(), corners.max()) * 1.3
         panel = plot.plot_panel("rings", 585, 34, 355, 120, (0, 100), (0, float(top)))
@@ -128,7 +129,7 @@ class CoverageView(ObservedView):
         names = "from the middle to the corner [%]", "share [%]"
         return plot.plotted(panel, content, *names, title="How far out")
 
-    def _tilt(self) -> str:
+    def _tilt(self) -> Marks:
         seen = self.observations
         distance = seen.distances
         steepest, farthest = max(60.0, 1.1 * float(np.nanmax(seen.tilts_deg))), 1.12 * float(np.nanmax(distance))
@@ -136,7 +137,7 @@ class CoverageView(ObservedView):
         points = np.stack([seen.tilts_deg, distance], axis=-1)
         content = svg.dots(panel.place(points), "blue", 9)
         if len(seen) <= 40:
-            content += "".join(
+            content += svg.join(
                 svg.text(panel.place(p) + (6, -5), name, "tick halo")
                 for name, p in zip(short_names(seen.pictures, len(seen)), points, strict=True)
             )

@@ -12,6 +12,7 @@ import numpy as np
 
 from camviz.draw import plot
 from camviz.draw.flow import Sentences, rows
+from camviz.draw.marks import Marks
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
 from camviz.draw.shades import Shades, bar, contours, heat
@@ -150,7 +151,7 @@ class CrossValidationView(View):
         }.get(self.show, "What noise lets expect")
         return panel.show(content, title=title) + legend, attached | bar_picture
 
-    def _views(self) -> str:
+    def _views(self) -> Marks:
         held, fitted = self.held.per_view, np.array(self.fitted)
         n, x = len(held), np.arange(1, len(held) + 1)
         top = 1.3 * float(np.nanmax(np.concatenate([held, fitted, [1e-9]])))

@@ -10,6 +10,7 @@ import numpy as np
 from camviz.cameras import transform
 from camviz.draw import plot, svg
 from camviz.draw.flow import rows
+from camviz.draw.marks import NOTHING
 from camviz.draw.picture import Picture
 from camviz.lenses.base import Array
 from camviz.views.base import View, slider
@@ -86,7 +87,7 @@ class DepthErrorView(View):
         top = 1.08 * float(finite.max()) if finite.size and finite.max() > 0 else 1.0
         unit, factor = ("m", 1.0) if top > 0.5 else ("cm", 100.0) if top > 0.02 else ("mm", 1000.0)
         panel = plot.plot_panel("depth", 70, 34, 590, 280, (0, self.farthest), (0, top * factor))
-        content = ""
+        content = NOTHING
         classes = {"calibration": "blue thick", "matching": "orange thick", "total": "ink thick"}
         for name, curve in curves.items():
             content += plot.curve(panel, depths, factor * curve, classes[name])

@@ -11,6 +11,7 @@ import numpy as np
 from camviz.cameras import Camera
 from camviz.draw import svg
 from camviz.draw.flow import rows
+from camviz.draw.marks import Marks
 from camviz.draw.panel import Panel, image_panel
 from camviz.draw.picture import Picture
 from camviz.draw.readout import readout
@@ -124,13 +125,13 @@ class DifferenceView(View):
         parts = {"difference": shown + legend, "numbers": self._words(690)}
         return self.tiled(_LAYOUT, parts, attached | bar_picture)
 
-    def _arrows(self, panel: Panel) -> str:
+    def _arrows(self, panel: Panel) -> Marks:
         found = self.compared(15, 10)
         starts = found.uv[1:-1:2, 1:-1:2].reshape(-1, 2)
         ends = starts + self.scale * found.shift[1:-1:2, 1:-1:2].reshape(-1, 2)
         return arrows(panel.place(starts), panel.place(ends), "ink", 7)
 
-    def _words(self, x: float) -> str:
+    def _words(self, x: float) -> Marks:
         n = self.numbers()
         rows = [
             ("typically apart", f"{n['median']:.3g} px"),

@@ -15,6 +15,7 @@ from camviz.cameras import Camera
 from camviz.draw import plot, svg
 from camviz.draw.flow import Sentences, rows
 from camviz.draw.items import closed
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_panel
 from camviz.draw.picture import Picture
 from camviz.draw.shades import Shades, bar, contours, heat
@@ -118,16 +119,16 @@ class FoldView(View):
             content, title=f"{self.name}: pixels for a degree", note=words
         ) + legend, attached | bar_picture
 
-    def _without_ray(self, panel: Panel, uv: Array, values: Array) -> str:
+    def _without_ray(self, panel: Panel, uv: Array, values: Array) -> Marks:
         none = ~np.isfinite(values)
         if not none.any():
-            return ""
+            return NOTHING
         generator = contour_generator(uv[..., 0], uv[..., 1], none.astype(float))
         outlines, rims = generator.filled(0.5, 1.5)[0], generator.lines(0.5)
-        filled = "".join(svg.polygon(panel.place(outline), "wash fill-red") for outline in outlines)
+        filled = svg.join(svg.polygon(panel.place(outline), "wash fill-red") for outline in outlines)
         return filled + svg.path([panel.place(rim) for rim in rims], "red thick")
 
-    def _denominator(self) -> str:
+    def _denominator(self) -> Marks:
         """D(r²) out to beyond the picture, where the model has one."""
         if not self._rational:
             words = (

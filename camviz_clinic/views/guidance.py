@@ -138,7 +138,7 @@ class GuidanceView(OrbitView):
 
         left, top, right, bottom = board.area
         whole = projected(ring * (right - left, bottom - top) + (left, top))
-        content += svg.polygon(whole, "fill-orange", style="fill-opacity:.18;stroke:none")
+        content += svg.polygon(whole, "fill-orange", fill_opacity=0.18, stroke="none")
         dark = [projected(edge) for edge in _rings(board, ring)]
         content += svg.path([d for d in dark if np.isfinite(d).all()], "fill-orange", closed=True)
         content += svg.line(closed(whole), "orange thick")

@@ -11,6 +11,7 @@ from scipy.special import erf, ndtri
 
 from camviz.draw import plot, svg
 from camviz.draw.flow import rows
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.picture import Picture
 from camviz.draw.readout import listed, readout
 from camviz.lenses.base import Array
@@ -80,7 +81,7 @@ class HistogramView(ObservedView):
             min(max(4 * np.nan_to_num(self.sigma), 1.05 * np.quantile(np.abs(x), 0.995)), 1.05 * np.abs(x).max() + 1e-9)
         )
 
-    def _histogram(self) -> str:
+    def _histogram(self) -> Marks:
         reach, x = self._reach, self.values
         count, edges = np.histogram(x, bins=_BINS, range=(-reach, reach))
         middle = (edges[1:] + edges[:-1]) / 2
@@ -91,11 +92,11 @@ class HistogramView(ObservedView):
             bell = len(x) * width * falling / (self.sigma * np.sqrt(2 * np.pi))
         panel = plot.plot_panel("histogram", 70, 34, 400, 240, (-reach, reach), (0, 1.15 * max(1.0, *count, *bell)))
         content = plot.bars(panel, edges[:-1], edges[1:], count.astype(float), "fill-blue half")
-        content += plot.curve(panel, middle, bell, "orange thick") if self.sigma > 0 else ""
+        content += plot.curve(panel, middle, bell, "orange thick") if self.sigma > 0 else NOTHING
         content += plot.legend(panel, [("blue thick", "residuals"), ("orange thick", "Gaussian")])
         return plot.plotted(panel, content, "residual [px]", "corners", title="How they are spread")
 
-    def _quantiles(self) -> str:
+    def _quantiles(self) -> Marks:
         """Sorted residuals over what a Gaussian of the same number would have: noise lies on the line."""
         x = self.values
         reach = max(self._reach, 1e-9)
@@ -109,7 +110,7 @@ class HistogramView(ObservedView):
             content += svg.dots(panel.place(np.stack([normal[shown], x[shown]], -1)), "blue", 4)
         return plot.plotted(panel, content, "of a Gaussian [σ]", "residual [px]", title="Quantile by quantile")
 
-    def _words(self) -> str:
+    def _words(self) -> Marks:
         figures = readout(self.numbers(), (765, 48), (0, 38), (0, 17))
         advice = (
             "Pure noise follows the orange curve. Tails that stand off it are outliers; a flat or two-peaked "

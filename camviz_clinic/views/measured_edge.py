@@ -11,6 +11,7 @@ import numpy as np
 
 from camviz.draw import plot, svg
 from camviz.draw.flow import rows
+from camviz.draw.marks import Marks
 from camviz.draw.panel import image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed
@@ -70,7 +71,7 @@ class MeasuredEdgeView(View):
         }
         return f"{self.name}: " + listed(written(figures)) + "."
 
-    def _photograph(self) -> str:
+    def _photograph(self) -> Marks:
         height, width = self.edge.image.shape
         panel = image_panel("photograph", 10, 34, 260, width, height, tallest=236)
         v = np.array([-0.5, height - 0.5])
@@ -79,7 +80,7 @@ class MeasuredEdgeView(View):
         content += svg.line(panel.place(np.stack([slope * v + intercept, v], axis=-1)), "orange")
         return panel.show(content, title="The edge", note=f"{abs(self.edge.angle_deg):.1f}°")
 
-    def _profile(self) -> str:
+    def _profile(self) -> Marks:
         reach = max(4.0, 2 * self.edge.rise)
         panel = plot.plot_panel("profile", 342, 34, 258, 236, (-reach, reach), (-0.15, 1.15))
         places, values = self.edge.edge_spread
@@ -87,7 +88,7 @@ class MeasuredEdgeView(View):
         curve, note = plot.curve(panel, places[near], values[near], "blue"), f"10–90 %: {self.edge.rise:.2f} px"
         return plot.plotted(panel, curve, "distance (px)", "light", title="Across the edge", note=note)
 
-    def _curve(self) -> str:
+    def _curve(self) -> Marks:
         edge = self.edge
         panel = plot.plot_panel("curve", 670, 34, 280, 236, (0, 1), (0, 1.1))
         frequency, values = edge.curve

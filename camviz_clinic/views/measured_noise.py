@@ -10,6 +10,7 @@ import numpy as np
 
 from camviz.draw import plot, svg
 from camviz.draw.flow import rows
+from camviz.draw.marks import Marks
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
 from camviz.draw.readout import listed
@@ -50,7 +51,7 @@ class MeasuredNoiseView(View):
         judged = self.measurement.judged
         return {words: told(name, judged[name]) for name, (words, _, _) in FIGURES.items()}
 
-    def transfer_panel(self, x: float, y: float) -> str:
+    def transfer_panel(self, x: float, y: float) -> Marks:
         """Temporal noise over signal on logarithmic axes: the ½ slope is the photons', its height the gain."""
         found = self.measurement
         signal, noise = _positive(found.signal), np.sqrt(_positive(found.variance))
@@ -65,9 +66,9 @@ class MeasuredNoiseView(View):
             _dots(panel, signal, noise, "blue"),
             plot.legend(panel, [*_LEGEND, ("orange dashed", "photons alone, √(K · signal)")], "bottom right"),
         ]
-        return _shown(panel, "".join(marks), "Photon transfer", "signal above the dark (DN)", "noise (DN)")
+        return _shown(panel, svg.join(marks), "Photon transfer", "signal above the dark (DN)", "noise (DN)")
 
-    def response_panel(self, x: float, y: float) -> str:
+    def response_panel(self, x: float, y: float) -> Marks:
         """Signal over light, with the deviation from a straight line in words."""
         found = self.measurement
         lit = bool(np.isfinite(found.photons).all())
@@ -82,7 +83,7 @@ class MeasuredNoiseView(View):
         xlabel = "photons per pixel" if lit else "exposure (ms)"
         return plot.plotted(panel, marks, xlabel, "signal (DN)", aside=58, title="Response", note=note)
 
-    def snr_panel(self, x: float, y: float) -> str:
+    def snr_panel(self, x: float, y: float) -> Marks:
         """Signal to noise over electrons: measured, the model, and what no sensor exceeds."""
         found = self.measurement
         below = slice(found.peak + 1)  # saturated pixels have no noise, and no signal to tell
@@ -96,7 +97,7 @@ class MeasuredNoiseView(View):
         marks += plot.legend(panel, [*_LEGEND, ("muted dashed", "photons alone, √electrons")], "top left")
         return _shown(panel, marks, "Signal to noise", "electrons freed by light", "signal / noise")
 
-    def dark_panel(self, x: float, y: float) -> str:
+    def dark_panel(self, x: float, y: float) -> Marks:
         """The dark frames' mean over exposure, whose slope is the dark current."""
         found = self.measurement
         exposure = 1000 * found.exposures_s
@@ -166,11 +167,11 @@ def _logarithmic(name: str, x: float, y: float, across: np.ndarray, up: np.ndarr
     return plot.plot_panel(name, x, y, _WIDTH, _HEIGHT, *limits)
 
 
-def _dots(panel: Panel, x: np.ndarray, y: np.ndarray, class_: str) -> str:
+def _dots(panel: Panel, x: np.ndarray, y: np.ndarray, class_: str) -> Marks:
     return svg.dots(panel.place(np.log10(np.stack([x, y], axis=-1))), class_, 5)
 
 
-def _shown(panel: Panel, marks: str, title: str, xlabel: str, ylabel: str) -> str:
+def _shown(panel: Panel, marks: str, title: str, xlabel: str, ylabel: str) -> Marks:
     ticks = plot.logarithmic(panel.left, panel.right), plot.logarithmic(panel.bottom, panel.top)
     return plot.plotted(panel, marks, xlabel, ylabel, *ticks, aside=58, title=title)
 

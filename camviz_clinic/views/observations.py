@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from camviz.cameras import Camera
 from camviz.draw import svg
+from camviz.draw.marks import Marks
 from camviz.draw.panel import Panel
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
@@ -38,7 +39,7 @@ def short_names(pictures: Sequence[str], views: int) -> tuple[str, ...]:
     return numbers if usable else tuple(str(view + 1) for view in range(views))
 
 
-def not_at_hand(panel: Panel) -> str:
+def not_at_hand(panel: Panel) -> Marks:
     """What stands in a panel for want of its photograph: how to have it."""
     words = "The picture is not at hand; name its folder: --images FOLDER, or in a notebook explore(images=FOLDER)."
     return svg.paragraph((8, panel.height - 60), words, panel.width - 16, "note halo clear")

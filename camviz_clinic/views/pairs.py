@@ -12,6 +12,7 @@ from camviz import twoview
 from camviz.cameras import Camera
 from camviz.draw import plot, svg
 from camviz.draw.flow import Sentences, rows
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.lenses import Perspective
@@ -169,7 +170,7 @@ class EpipolarPairsView(ViewChooser):
     def _bars(self) -> Panel:
         return plot.plot_panel("pairs", 70, 34, 870, 110, (0.5, len(self.shared) + 0.5), (0, ceiling(self.shared.rms)))
 
-    def _bars_panel(self) -> str:
+    def _bars_panel(self) -> Marks:
         shared, panel = self.shared, self._bars
         content = plot.grid(panel, xticks=[]) + bars_of(panel, shared.rms, self.index)
         content += plot.level(panel, shared.total_rms, "ink dashed") + figures_on(panel, shared.rms)
@@ -199,7 +200,7 @@ class EpipolarPairsView(ViewChooser):
         content += not_at_hand(panel) if image is None and shared.pictures else ""
         return panel.show(content, title=f"{shared.names[side]}: arrows × {self.scale:g}"), attached
 
-    def _lines(self, panel: Panel, side: int) -> str:
+    def _lines(self, panel: Panel, side: int) -> Marks:
         """The other picture's rays of a few corners, as this camera sees them."""
         shared, i = self.shared, self.index
         cameras = (shared.left, shared.right)
@@ -208,7 +209,7 @@ class EpipolarPairsView(ViewChooser):
         other = shared.detections[1 - side][i][chosen]
         other = other[np.isfinite(other[:, 0])]
         if not len(other):
-            return ""
+            return NOTHING
         curves = twoview.epipolar_curve(cameras[1 - side], cameras[side], other, _DISTANCES)
         return on_photograph(clipped(panel, panel.place(curves)), "green thin")
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from camviz.draw import plot, svg
 from camviz.draw.flow import Sentences, rows
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
 from camviz.draw.readout import true_minus
@@ -107,7 +108,7 @@ class RadiusView(ObservedView):
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
-        plots = ""
+        plots = NOTHING
         for i, (name, title) in enumerate((("outward", "Outward"), ("around", "Around the principal point"))):
             plots += self._plot(name, title, 1 + i, 34 + 172 * i, 128)
         advice = (
@@ -117,7 +118,7 @@ class RadiusView(ObservedView):
         parts = {"picture": self._picture(), "rings": plots, "in words": Sentences(advice)}
         return self.tiled(_LAYOUT, parts)
 
-    def _plot(self, name: str, title: str, part: int, y: float, height: float) -> str:
+    def _plot(self, name: str, title: str, part: int, y: float, height: float) -> Marks:
         radius, values = self.polar[0], self.polar[part]
         middle, mean, error = self.rings[:, 0], self.rings[:, 2 * part - 1], self.rings[:, 2 * part]
         reach = max(
@@ -134,7 +135,7 @@ class RadiusView(ObservedView):
         yticks = [(y, true_minus(f"{y:.3g}")) for y in ticks.tolist()]
         content = svg.dots(panel.place(dots), "muted faint", 3)
         low, high = (panel.place(np.stack([middle, mean + sign * 2 * error], -1)) for sign in (-1, 1))
-        content += svg.segments(low, high, "orange half", style="stroke-width:7px;stroke-linecap:butt")
+        content += svg.segments(low, high, "orange half", stroke_width=7, stroke_linecap="butt")
         known = np.isfinite(mean)
         content += plot.curve(panel, middle[known], mean[known], "orange thick") + svg.dots(
             panel.place(np.stack([middle, mean], -1)), "orange", 7
@@ -143,7 +144,7 @@ class RadiusView(ObservedView):
         note = "mean of a ring ± 2 standard errors" if part == 1 else "clockwise is positive"
         return plot.plotted(panel, content, label, "[px]", None, yticks, title=title, note=note)
 
-    def _picture(self) -> str:
+    def _picture(self) -> Marks:
         k = self.observations.camera.intrinsics
         panel = image_panel("cells", 20, 34, 430, k.width, k.height, tallest=300)
         middles, means = self.cells

@@ -14,6 +14,7 @@ from camviz import twoview
 from camviz.cameras import Camera
 from camviz.draw import svg
 from camviz.draw.flow import Sentences, rows
+from camviz.draw.marks import Marks
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.lenses.base import Array
@@ -148,7 +149,7 @@ class RectifiedView(ViewChooser):
             return garden.taken(source.at(in_garden), max(source.intrinsics.width, source.intrinsics.height))[0]
         return cv2.resize(image, (source.intrinsics.width, source.intrinsics.height), interpolation=cv2.INTER_AREA)
 
-    def _marks(self, panel: Panel, side: int, turned: Camera, camera: Camera) -> str:
+    def _marks(self, panel: Panel, side: int, turned: Camera, camera: Camera) -> Marks:
         k = turned.intrinsics
         rows = (np.arange(round(self.rows)) + 0.5) * k.height / round(self.rows) - 0.5
         content = on_photograph([panel.place([(-0.5, v), (k.width - 0.5, v)]) for v in rows], "sky thin")

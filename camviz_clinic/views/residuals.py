@@ -13,6 +13,7 @@ import numpy as np
 
 from camviz.draw import plot, svg
 from camviz.draw.flow import rows
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout
@@ -123,7 +124,7 @@ class ResidualsView(ViewChooser, OrbitView):
         k = self.observations.camera.intrinsics
         return image_panel("picture", 20, 236, 450, k.width, k.height, tallest=338)
 
-    def bars_panel(self, panel: Panel, *, handle: bool = False, links: Mapping[int, str] | None = None) -> str:
+    def bars_panel(self, panel: Panel, *, handle: bool = False, links: Mapping[int, str] | None = None) -> Marks:
         """A bar per view, the chosen one orange; with `handle` for the pointer, or with `links` from views (from 0)."""
         seen, n = self.observations, len(self.observations)
         rms, all_seen = seen.rms, np.where(seen.rms_seen > np.nan_to_num(seen.rms) * 1.001, seen.rms_seen, np.nan)
@@ -132,7 +133,7 @@ class ResidualsView(ViewChooser, OrbitView):
         if links is None:
             content += bars_of(panel, rms, self.index)
         else:
-            content += "".join(self._linked_bar(panel, i, links.get(i)) for i in range(n))
+            content += svg.join(self._linked_bar(panel, i, links.get(i)) for i in range(n))
         content += plot.level(panel, seen.total_rms, "ink dashed")
         content += figures_on(panel, np.fmax(rms, all_seen))
         content += figures_in(panel, np.where(np.isfinite(all_seen), rms, np.nan))
@@ -144,7 +145,7 @@ class ResidualsView(ViewChooser, OrbitView):
         place = (panel.x + panel.width - (112 if handle else 0), panel.y - 8)
         return shown + svg.text(place, words, "note end") + plot.axes(panel, "", "RMS [px]", xticks=self._view_names())
 
-    def _linked_bar(self, panel: Panel, i: int, link: str | None) -> str:
+    def _linked_bar(self, panel: Panel, i: int, link: str | None) -> Marks:
         """One bar, and all above it, as a link to its view; a bar whose view is not shown is none."""
         seen = self.observations
         left, right = places(self.count)
@@ -156,7 +157,7 @@ class ResidualsView(ViewChooser, OrbitView):
         (x0, _), (x1, _) = panel.place([(i + 0.5, 0), (i + 1.5, 0)])
         target = svg.rectangle(x0, 0, x1 - x0, panel.height, "target")
         words = f"{seen.picture(i)}, {_pixels(seen.rms_seen[i])}"
-        return svg.element("a", target + drawn, href=link, data_choose=i + 1, aria_label=words)
+        return svg.group(target + drawn, href=link, data_choose=i + 1, aria_label=words)
 
     def _view_names(self) -> list[tuple[float, str]]:
         numbers = range(self.count)
@@ -167,7 +168,7 @@ class ResidualsView(ViewChooser, OrbitView):
         """The chosen view's picture with its corners and arrows, and the photographs it needs."""
         seen, i, k = self.observations, self.index, self.observations.camera.intrinsics
         image = seen.photographs(i)
-        content, attached, missing = self._grid(panel), {}, not_at_hand(panel) if seen.pictures else ""
+        content, attached, missing = self._grid(panel), {}, not_at_hand(panel) if seen.pictures else NOTHING
         if image is not None:
             content, missing = placed_image(panel, "photograph", k.width, k.height), ""
             attached = {"photograph": jpeg(image)}
@@ -184,13 +185,13 @@ class ResidualsView(ViewChooser, OrbitView):
         seen, i = self.observations, self.index
         return seen.detections[i] - self.scale * seen.residuals[i]
 
-    def _grid(self, panel: Panel) -> str:
+    def _grid(self, panel: Panel) -> Marks:
         """The board's lines as projected, for want of a photograph."""
         seen = self.observations
         grid = panel.place(seen.projected[self.index]).reshape(seen.board.rows, seen.board.columns, 2)
         return svg.path([*grid, *grid.swapaxes(0, 1)], "muted thin")
 
-    def board_panel(self, place: Panel) -> str:
+    def board_panel(self, place: Panel) -> Marks:
         """The chosen view's residuals as seen on the board itself, in its own frame."""
         seen, i, board = self.observations, self.index, self.observations.board
         left, top, right, bottom = board.area
@@ -230,7 +231,7 @@ class ResidualsView(ViewChooser, OrbitView):
             seen.camera, seen.cam_from_board, seen.board, "camera", self.index + 1, eye=eye, hidden=hidden, names=names
         )
 
-    def _numbers_block(self) -> str:
+    def _numbers_block(self) -> Marks:
         return svg.text((490, 602), f"{self.observations.picture(self.index)}", "title") + readout(
             self.numbers(), (490, 628), (0, 22), (100, 0)
         )

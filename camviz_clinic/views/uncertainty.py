@@ -12,6 +12,7 @@ import numpy as np
 from camviz.cameras import Camera
 from camviz.draw import plot, svg
 from camviz.draw.flow import rows
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
 from camviz.draw.readout import readout
@@ -117,7 +118,7 @@ class UncertaintyView(SolvedView):
         parts = {"uncertainty": shown + legend, "numbers": self._words(690)}
         return self.tiled(_LAYOUT, parts, attached | bar_picture)
 
-    def _ellipses(self, panel: Any) -> str:
+    def _ellipses(self, panel: Any) -> Marks:
         """Ellipses of one standard deviation at a few pixels, all enlarged so that the smallest can be seen."""
         uv, covariance = self.covariances(15, 10)
         uv, covariance = uv[1:-1:2, 1:-1:2].reshape(-1, 2), covariance[1:-1:2, 1:-1:2].reshape(-1, 2, 2)
@@ -125,16 +126,16 @@ class UncertaintyView(SolvedView):
         long = np.sqrt(np.maximum(values[:, 1], 0))
         known = np.isfinite(covariance).all(axis=(1, 2)) & (long > 0)
         if not known.any():
-            return ""
+            return NOTHING
         # Lengths by the logarithm, for they differ a hundredfold; the ratio of the axes is kept.
         reach = (7 + 9 * np.clip(np.log10(np.where(known, long, 1) / np.median(long[known])) + 0.5, 0, 1)) / np.where(
             long > 0, long, 1
         )
         axes = directions * np.sqrt(np.maximum(values, 0))[:, None, :] * reach[:, None, None]
         lines = panel.place(uv)[:, None] + circle(25) @ np.swapaxes(axes, 1, 2)
-        return svg.path(lines[known], "paper-line", style="stroke-width:3px") + svg.path(lines[known], "ink thin")
+        return svg.path(lines[known], "paper-line", stroke_width=3) + svg.path(lines[known], "ink thin")
 
-    def _words(self, x: float) -> str:
+    def _words(self, x: float) -> Marks:
         n = self.numbers()
         rows = [("in the middle", f"±{n['middle']:.3g} px"), ("at worst", f"±{n['worst']:.3g} px"),
                 ("below 1 px over", f"{100 * n['below_1']:.0f} % of the picture"),

@@ -13,6 +13,7 @@ from camviz import distortion
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
 from camviz.draw.flow import Sentences, rows
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.lenses.base import on_plane
@@ -97,13 +98,13 @@ class UndistortedView(View):
             return garden.taken(small, max(small.intrinsics.width, small.intrinsics.height))[0]
         return cv2.resize(self.image, (small.intrinsics.width, small.intrinsics.height), interpolation=cv2.INTER_AREA)
 
-    def _straight(self, panel: Panel) -> str:
+    def _straight(self, panel: Panel) -> Marks:
         return on_photograph(panel.place(_grid(self.camera.intrinsics)), "sky thin") if self.lines else ""
 
-    def _bent(self, panel: Panel, found: tuple[Intrinsics, tuple[int, int, int, int]] | str) -> str:
+    def _bent(self, panel: Panel, found: tuple[Intrinsics, tuple[int, int, int, int]] | str) -> Marks:
         """The grid of the undistorted picture where it lies in the photograph."""
         if isinstance(found, str) or not self.lines:
-            return ""
+            return NOTHING
         rays = on_plane(found[0].from_pixels(_grid(self.camera.intrinsics)))
         bent = self.camera.intrinsics.to_pixels(self.camera.lens.project(rays))
         return on_photograph(panel.place(bent), "sky thin")
@@ -117,7 +118,7 @@ def _grid(k: Intrinsics) -> NDArray[np.float64]:
     return np.array(rows + columns)
 
 
-def _rectangle(panel: Panel, roi: tuple[int, int, int, int]) -> str:
+def _rectangle(panel: Panel, roi: tuple[int, int, int, int]) -> Marks:
     x0, y0, width, height = roi
     corners = np.array([(x0, y0), (x0 + width, y0), (x0 + width, y0 + height), (x0, y0 + height), (x0, y0)]) - 0.5
     return on_photograph([panel.place(corners)], "yellow thick")

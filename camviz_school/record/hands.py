@@ -6,7 +6,6 @@ nothing recorded (a board in space, a point of an image) get none; a pointer the
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -22,7 +21,6 @@ from camviz.views.base import View
 PULLS = tuple(float(pull) for pull in np.linspace(-480, 480, 49))  # picture units, as far as a picture's middle
 PLACES = (36, 24)  # columns and rows over a tile, at which the pointer is tried
 KEYS = (("ArrowRight", "ArrowLeft"), ("ArrowUp", "ArrowDown"), ("+", "-"))
-_HANDLE = re.compile(r'data-drag="([^"]+)"')
 
 Read = Callable[[View], Mapping[str, Any]]
 """The recorded axes' values in a view."""
@@ -53,7 +51,7 @@ def hands(trial: Reading, picture: Picture) -> dict[str, dict[str, Any]]:
     """
     found: dict[str, dict[str, Any]] = {}
     for tile in picture.tiles:
-        for handle in dict.fromkeys(_HANDLE.findall(tile.body)):
+        for handle in tile.marks.handles:
             does = {"keys": _keys(trial, handle), "pulls": _pulls(trial, handle), **_places(trial, handle, tile.cell)}
             found[handle] = {name: one for name, one in does.items() if one}
     return {handle: does for handle, does in found.items() if does}

@@ -151,7 +151,7 @@ class Explored:
     @cached_property
     def axes(self) -> tuple[Axis, ...]:
         axes = [_axis(**control) for control in self._explorer.controls]
-        if any(f'data-drag="{handle}"' in tile.body for handle in ORBIT_HANDLES for tile in self._picture.tiles):
+        if any(handle in tile.marks.handles for handle in ORBIT_HANDLES for tile in self._picture.tiles):
             axes.append(Axis.turn(EYE, _read(self._first, EYE)))
         if self._further:
             axes.append(Axis(PANEL, "", ("", *self._further), with_each=True))

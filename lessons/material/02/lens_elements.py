@@ -11,6 +11,7 @@ import numpy as np
 from camviz import optics
 from camviz.draw import svg
 from camviz.draw.flow import rows
+from camviz.draw.marks import Marks
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
 from camviz.draw.readout import listed, readout
@@ -88,7 +89,7 @@ class LensElementsView(View):
         half = max((right - left) * _TALL / _WIDE / 2, 1.1 * _HIGHEST_MM)
         return Panel("section", 10, 34, _WIDE, _TALL, right - 2 * half * _WIDE / _TALL, right, half, -half)
 
-    def _section(self) -> str:
+    def _section(self) -> Marks:
         panel, lens = self._panel, self.prescription
         slope = self.image_mm / lens.focal_mm
         end = lens.length_mm + lens.back_focal_mm
@@ -100,7 +101,7 @@ class LensElementsView(View):
         content = (
             svg.line(panel.place([(panel.left, 0), (panel.right, 0)]), "muted dashed thin")
             + svg.path([panel.place(np.array(line)) for line in thin], "purple dashed thin")
-            + "".join(svg.polygon(panel.place(glass), "wash fill-sky") for glass in self._glasses())
+            + svg.join(svg.polygon(panel.place(glass), "wash fill-sky") for glass in self._glasses())
             + svg.path([panel.place(glass) for glass in self._glasses()], "sky thin", closed=True)
             + svg.path([panel.place(ray) for ray in rays], "blue")
             + self._plane(planes[0], "H", 1 if planes[0] > planes[1] else -1)
@@ -114,7 +115,7 @@ class LensElementsView(View):
         (z0, y0), (z1, y1) = ray[-2:]
         return float(y1 + (self.prescription.rear_principal_mm - z1) * (y1 - y0) / (z1 - z0))
 
-    def _plane(self, z: float, name: str, side: int) -> str:
+    def _plane(self, z: float, name: str, side: int) -> Marks:
         panel = self._panel
         top, bottom = panel.place([(z, 0.86 * panel.top), (z, 0.86 * panel.bottom)])
         side = -side if not 30 < top[0] < panel.width - 30 else side  # where the border would cut the name

@@ -16,6 +16,7 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
 from camviz.draw.flow import WIDTH, Cell, rows, shortened
 from camviz.draw.items import closed
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.matrix import intrinsic_matrix
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
@@ -159,71 +160,70 @@ class IntrinsicsView(CameraMatrix):
         """In the pixels of the picture as taken."""
         return image_in(self._layout["picture"], "picture", self.width, self.height)
 
-    def _picture_panel(self) -> str:
+    def _picture_panel(self) -> Marks:
         panel, K = self._picture, self.intrinsics
         coarse = {"style": "image-rendering:pixelated"} if K.width < 200 else {}
         content = placed_image(panel, "camera", self.width, self.height, **coarse) + self._window()
-        content += self._behind() if self._marked("balloon") else ""
-        content += self._globe() if self._marked("globe") else ""
-        content += self._principal_point() if self._marked("centre") else ""
+        content += self._behind() if self._marked("balloon") else NOTHING
+        content += self._globe() if self._marked("globe") else NOTHING
+        content += self._principal_point() if self._marked("centre") else NOTHING
         note = f"{K.width} × {K.height} pixels"
         title = "The picture" if self.operation == "as taken" else f"The picture, {self.operation}"
         return panel.show(content, title=title, note=note)
 
-    def _window(self) -> str:
+    def _window(self) -> Marks:
         """The corners' names in the picture's own pixels; around a crop, what it leaves out."""
         panel, K = self._picture, self.intrinsics
         (x0, y0), (x1, y1) = self._as_taken([(-0.5, -0.5), (K.width - 0.5, K.height - 0.5)])
-        names = ""
+        names = NOTHING
         if self._marked("corners"):
             names = _tag((x0 + 8, y0 + 17), "(0, 0)") + _tag(
                 (x1 - 8, y1 - 9), f"({K.width - 1}, {K.height - 1})", "end"
             )
         if self.operation != "cropped":
             return names
-        hole = f"M0,0H{panel.width:g}V{panel.height:g}H0ZM{x0:.1f},{y0:.1f}V{y1:.1f}H{x1:.1f}V{y0:.1f}Z"
-        shade = svg.element("path", d=hole, style="fill:#000;fill-opacity:.55;stroke:none")
+        around = [(0, 0), (panel.width, 0), (panel.width, panel.height), (0, panel.height)]
+        hole = [(x0, y0), (x0, y1), (x1, y1), (x1, y0)]
+        shade = svg.path([around, hole], "", closed=True, fill="#000", fill_opacity=0.55, stroke="none")
         label = f"The cropped window, from column {self._corner[0]} and row {self._corner[1]}; arrow keys move it"
-        handle = {"data_drag": "window", "tabindex": 0, "role": "group", "aria_label": label}
         frame = svg.polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], "orange thick")
         hand = svg.rectangle(x0, y0, x1 - x0, y1 - y0, "card", fill_opacity=0)
-        return shade + svg.group(hand + frame + names, **handle)
+        return shade + svg.handle(hand + frame + names, "window", label)
 
     def _as_taken(self, uv: Any) -> Array:
         """Panel coordinates (..., 2) of pixels (..., 2) of the picture after the operation: the same rays."""
         return self._picture.place(self.taken.to_pixels(self.intrinsics.from_pixels(uv)))
 
-    def _principal_point(self) -> str:
+    def _principal_point(self) -> Marks:
         K = self.intrinsics
         at = self._as_taken((K.cx, K.cy))
         ends = at - np.diag((12, 12)), at + np.diag((12, 12))
-        cross = svg.segments(*ends, "white", style="stroke:#fff;stroke-width:6px") + svg.segments(*ends, "orange thick")
+        cross = svg.segments(*ends, "white", stroke="#fff", stroke_width=6) + svg.segments(*ends, "orange thick")
         side, dx = ("end", -8) if at[0] > self._picture.width - 80 else ("", 8)
         inside = np.clip(at + (dx, 22), (8, 36), np.array([self._picture.width, self._picture.height]) - (8, 30))
         before, after = "← " if at[0] < 0 else "", " →" if at[0] > self._picture.width else ""
         name = _tag(inside, f"{before}(cx, cy){after}", side)
-        hand = svg.element("circle", cx=at[0], cy=at[1], r=16, fill_opacity=0, class_="card")
+        hand = svg.disc(at, 16, "card", fill_opacity=0)
         label = f"Principal point at column {K.cx:.1f}, row {K.cy:.1f}; arrow keys move it"
-        handle = {"data_drag": "principal", "tabindex": 0, "role": "group", "aria_label": label}
-        return svg.group(hand + cross + name, **handle)
+        return svg.handle(hand + cross + name, "principal", label)
 
-    def _behind(self) -> str:
+    def _behind(self) -> Marks:
         """Where in the picture the balloon is, whether or not it can be seen."""
         outline = self._seen(balloon_rim(self.camera.centre))
         if not self._in_picture(outline):
-            return ""
+            return NOTHING
         hidden = self.in_sight() < 0.5
         top = outline[np.argmin(outline[:, 1])] - (0, 11)
-        ring = svg.line(outline, "white", style="stroke:#fff;stroke-width:4.5px") if hidden else ""
+        ring = svg.line(outline, "white", stroke="#fff", stroke_width=4.5) if hidden else ""
         words = "a balloon, behind the wall" if hidden else "the balloon"
         return ring + svg.line(outline, f"red thick{' dotted' if hidden else ''}") + _tag(top, words, "middle")
 
-    def _globe(self) -> str:
+    def _globe(self) -> Marks:
         """How wide the globe is, in the pixels of the picture after the operation."""
         ends = GLOBE + np.array([(-GLOBE_RADIUS, -GLOBE_RADIUS - 0.08, 0), (GLOBE_RADIUS, -GLOBE_RADIUS - 0.08, 0)])
         left, right = self._seen(ends)
         if not self._in_picture((left, right)):
-            return ""
+            return NOTHING
         pixels = self.intrinsics.fx * 2 * GLOBE_RADIUS / self.distance
         half = np.array((0, 5))
         bar = svg.segments([left, left - half, right - half], [right, left + half, right + half], "green thick")
@@ -298,7 +298,7 @@ class IntrinsicsView(CameraMatrix):
 
     # The matrices ----------------------------------------------------------------------------------------------------
 
-    def _matrices(self) -> dict[str, str]:
+    def _matrices(self) -> dict[str, Marks]:
         """K, and what becomes of it: in a tile beside it, or in one narrow tile below it."""
         x, y, across, _ = self._layout["K"]
         x, y = x + 10, y + 48
@@ -309,7 +309,7 @@ class IntrinsicsView(CameraMatrix):
         left, _, wide, _ = self._layout[_AFTER]
         return {"K": before, _AFTER: self._afterwards(left + 10, y, wide - 20)}
 
-    def _afterwards(self, x: float, y: float, width: float) -> str:
+    def _afterwards(self, x: float, y: float, width: float) -> Marks:
         """What the operation makes of K, and by which rule; of a picture as taken, what K does."""
         K = self.intrinsics
         if self.operation == "as taken":
@@ -317,12 +317,12 @@ class IntrinsicsView(CameraMatrix):
             equations = [u, added(K.cx)] if K.skew else [f"{u} {added(K.cx)}"]
             equations.append(f"v = {K.fy:.2f} y {added(K.cy)}")
             lines = [*((line, "number") for line in equations), ("with x = X/Z, y = Y/Z", "note")]
-            return "".join(svg.text((x, y + 10 + 20 * i), *line) for i, line in enumerate(lines))
+            return svg.join(svg.text((x, y + 10 + 20 * i), *line) for i, line in enumerate(lines))
         changed = ~np.isclose(self.taken.K, K.K, rtol=0, atol=1e-9)
         after = intrinsic_matrix(x, y, f"K, {self.operation}", K.K, changed)
         return after + svg.paragraph((x, y + 98), self.rule(), width)
 
-    def _lattice_panel(self) -> dict[str, str]:
+    def _lattice_panel(self) -> dict[str, Marks]:
         """A few pixels as they lie on the sensor, their lean drawn larger than it is."""
         K = replace(self.intrinsics, skew=_LEAN_DRAWN * self.intrinsics.skew)
         x, y, across, high = self._layout["pixels"]
@@ -349,7 +349,7 @@ class IntrinsicsView(CameraMatrix):
         note = f"lean drawn {_LEAN_DRAWN} ×" if K.skew else ""
         return {"pixels": panel.show(content, title="Its pixels", note=note)}
 
-    def _numbers_column(self) -> dict[str, str]:
+    def _numbers_column(self) -> dict[str, Marks]:
         """All figures, and the shape of a pixel only beside K or pixels, or where millimetres count."""
         x, y, _, _ = self._layout["numbers"]
         figures = self.numbers()
@@ -378,10 +378,10 @@ class IntrinsicsView(CameraMatrix):
         return self.dragged(handle, float("nan"), float("nan"), float(dx), float(dy))
 
 
-def _tag(at: Any, words: str, anchor: str = "") -> str:
+def _tag(at: Any, words: str, anchor: str = "") -> Marks:
     """Words on a photograph: white with a dark edge, whatever the theme."""
-    edge = "fill:#fff;stroke:#10151c;stroke-width:4px;stroke-linejoin:round;paint-order:stroke"
-    return svg.text(at, words, f"label {anchor}", style=edge)
+    edge = {"fill": "#fff", "stroke": "#10151c", "stroke_width": 4, "stroke_linejoin": "round", "paint_order": "stroke"}
+    return svg.text(at, words, f"label {anchor}", **edge)
 
 
 def _ray(camera: Camera, uv: Array, length: float) -> Array:

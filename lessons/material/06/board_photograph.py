@@ -6,6 +6,7 @@ import numpy as np
 
 from camviz.cameras import Camera, transform
 from camviz.draw import svg
+from camviz.draw.marks import Marks
 from camviz.draw.panel import Panel, placed_image
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
@@ -24,7 +25,7 @@ def behind(camera: Camera) -> dict[str, bytes]:
     return {BEHIND: garden.taken(camera, garden.FINE)[1]}
 
 
-def held_board(panel: Panel, board: Board, cam_from_board: RigidTransform, camera: Camera) -> str:
+def held_board(panel: Panel, board: Board, cam_from_board: RigidTransform, camera: Camera) -> Marks:
     """The garden, and the board before it: its white sheet and its dark squares, brighter where they face the light."""
     turned = cam_from_board.rotation.as_matrix()[:, 2]
     bright = 0.62 + 0.38 * float(abs(turned @ _LIGHT)) / float(np.linalg.norm(_LIGHT))
@@ -42,8 +43,8 @@ def held_board(panel: Panel, board: Board, cam_from_board: RigidTransform, camer
     garden_seen = placed_image(panel, BEHIND, camera.intrinsics.width, camera.intrinsics.height)
     return (
         garden_seen
-        + svg.polygon(sheet, "plain", style=f"fill:{_colour(bright * _WHITE)};stroke:#0006;stroke-width:1px")
-        + svg.path(squares, "plain", closed=True, style=f"fill:{_colour(bright * _BLACK)};stroke:none")
+        + svg.polygon(sheet, "plain", fill=_colour(bright * _WHITE), stroke="#0006", stroke_width=1)
+        + svg.path(squares, "plain", closed=True, fill=_colour(bright * _BLACK), stroke="none")
     )
 
 

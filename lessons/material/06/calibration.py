@@ -15,6 +15,7 @@ import numpy as np
 from camviz.cameras import Camera, transform
 from camviz.draw import svg
 from camviz.draw.flow import Cell, rows, shortened
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, signed
@@ -194,7 +195,7 @@ class CalibrationView(OrbitView, EstimateNumbers):
         """Whether the picture is one of the virtual camera, which is taken here, and not all corners at once."""
         return not (self.photographs or self._has(_CORNERS) or self.seen is not None)
 
-    def _image(self) -> str:
+    def _image(self) -> Marks:
         panel = self._image_panel
         others = np.delete(self.corners, self.index, axis=0)
         marks = svg.dots(panel.place(others), "muted", 2.6) + self._vectors(panel) + self._handle(panel)
@@ -214,7 +215,7 @@ class CalibrationView(OrbitView, EstimateNumbers):
         title = f"Picture {self.index + 1} of {self.count}" if one else "What the camera saw"
         return panel.show(content, title=title, note=note, **drag)
 
-    def _coverage(self, panel: Panel) -> str:
+    def _coverage(self, panel: Panel) -> Marks:
         """Cells in which corners were seen, the darker the more."""
         uv = self.corners[self.used].reshape(-1, 2)
         uv = uv[np.isfinite(uv).all(axis=1)]
@@ -224,12 +225,12 @@ class CalibrationView(OrbitView, EstimateNumbers):
         starts = panel.place(places * cell - 0.5)
         squared = starts[:, None] + np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * (cell * panel.scale)
         level = np.minimum(np.ceil(count / 4), 3)
-        return "".join(
-            svg.path(squared[level == i], "fill-blue", closed=True, style=f"fill-opacity:{0.09 * i:g};stroke:none")
+        return svg.join(
+            svg.path(squared[level == i], "fill-blue", closed=True, fill_opacity=0.09 * i, stroke="none")
             for i in (1, 2, 3)
         )
 
-    def _outlined(self, panel: Panel) -> str:
+    def _outlined(self, panel: Panel) -> Marks:
         """The picked board: its rows and columns of corners, in the order in which they are found."""
         uv = panel.place(self.corners[self.index]).reshape(self.board.rows, self.board.columns, 2)
         strength = " thin half" if self.photographs else "" if self.used[self.index] else " dashed"
@@ -241,10 +242,10 @@ class CalibrationView(OrbitView, EstimateNumbers):
         typical = self.adjustment.rms if self.adjustment else 1.0
         return float(_MAGNIFIED[np.abs(np.log(_MAGNIFIED * max(typical, 1e-3) / 9)).argmin()])
 
-    def _vectors(self, panel: Panel) -> str:
+    def _vectors(self, panel: Panel) -> Marks:
         """The residuals, magnified, from where the estimated camera would see a corner towards where it was found."""
         if self.adjustment is None:
-            return ""
+            return NOTHING
         residuals, found = self.residuals, self.corners
         starts, ends = panel.place(found), panel.place(found + self.magnified * residuals)
         others = np.arange(self.count) != self.index
@@ -258,15 +259,15 @@ class CalibrationView(OrbitView, EstimateNumbers):
         pose, middle = self.cam_from_board[self.index], middle_of(self.board)
         return self._true_camera.project(transform(pose, [middle, middle - (0, 0, _NORMAL)]))
 
-    def _handle(self, panel: Panel) -> str:
+    def _handle(self, panel: Panel) -> Marks:
         if self.seen is not None:
-            return ""
+            return NOTHING
         middle, tip = panel.place(self._grips)
         tip = np.clip(np.where(np.isfinite(tip), tip, middle), 10, np.array([panel.width, panel.height]) - 10)
         words = "A stick upright on the board: drag it, or press the arrow keys, to tilt the board"
-        hand = svg.element("circle", cx=tip[0], cy=tip[1], r=16, fill_opacity=0, class_="card")
+        hand = svg.disc(tip, 16, "card", fill_opacity=0)
         knob = hand + svg.dots([tip], "paper-dot", 15) + svg.dots([tip], "orange", 11)
-        grip = svg.group(knob, data_drag="tilt", tabindex=0, role="group", aria_label=words)
+        grip = svg.handle(knob, "tilt", words)
         return svg.line([middle, tip], "orange thick") + svg.dots([middle], "orange", 6) + grip
 
     # The boards in space ---------------------------------------------------------------------------------------------

@@ -14,6 +14,7 @@ import numpy as np
 from camviz.cameras import Camera, transform
 from camviz.draw import svg
 from camviz.draw.flow import Cell
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.readout import true_minus
 from camviz.poses import RigidTransform
 from camviz.views.yours import YOURS_HERE, is_unwritten, tried
@@ -23,7 +24,7 @@ _LOW, _HIGH = 0.05, 50.0  # pixels at the ends of the bars of two kinds of error
 _FULL_PX, _FULL_PERCENT = 3.0, 50.0  # at the ends of the bars of the fit
 _NUMBER = 88  # units beyond the longest bar, for the number at its end
 PIXELS = ("fx", "fy", "cx", "cy")
-NOTHING = "No board is seen: nothing to estimate from"
+NO_BOARD = "No board is seen: nothing to estimate from"
 
 
 @dataclass(frozen=True)
@@ -44,12 +45,12 @@ class ErrorBars(BoardPictures):
             return float("nan")
         return 100 * abs(self.camera.intrinsics.fx / self.truth.intrinsics.fx - 1)
 
-    def _fit(self, cell: Cell) -> str:
+    def _fit(self, cell: Cell) -> Marks:
         """What a report of a calibration says, and how far its focal length is off."""
         x, y, width = cell[0] + 14, cell[1], cell[2] - 28
         parts = [svg.text((x, y + 26), "What the program reports", "title")]
         if self.adjustment is None:
-            return "".join(parts) + svg.paragraph((x, y + 56), NOTHING, width, "label")
+            return svg.join(parts) + svg.paragraph((x, y + 56), NO_BOARD, width, "label")
         rms = self.adjustment.rms
         parts.append(_large_bar(x, y + 44, width, "its fit: the RMS error of all corners", rms / _FULL_PX, "fill-blue"))
         parts.append(_large_number(x, y + 44, width, rms / _FULL_PX, f"{_digits(rms)} px"))
@@ -64,9 +65,9 @@ class ErrorBars(BoardPictures):
             parts.append(_large_number(x, y + 40, width, share, f"{percent(self.off_percent)} %"))
             true = number("fx", self.true["fx"])
             parts.append(svg.text((x, y + 118), f"fx = {fx} px in place of {true}", "number"))
-        return "".join(parts)
+        return svg.join(parts)
 
-    def _your_bar(self, x: float, y: float, width: float) -> str:
+    def _your_bar(self, x: float, y: float, width: float) -> Marks:
         assert self.adjustment
         value, problem = self._by_your_rms(slice(None))
         waits = is_unwritten(problem)
@@ -77,7 +78,7 @@ class ErrorBars(BoardPictures):
         if not waits:
             bar += _large_number(x, y, width, shown / _FULL_PX, f"{_digits(shown)} px", "orange")
         words = svg.text((x, y + 14), f"the same: {YOURS_HERE}", "title")
-        return svg.group(bar, class_="awaited") + words if waits else bar
+        return svg.group(bar, "awaited") + words if waits else bar
 
     def _by_your_rms(self, boards: Any) -> tuple[float, str]:
         """The reader's RMS error of some of the boards, and what is wrong with the function."""
@@ -88,29 +89,29 @@ class ErrorBars(BoardPictures):
 
     # Two kinds of error -----------------------------------------------------------------------------------------------
 
-    def _errors(self, cell: Cell) -> str:
+    def _errors(self, cell: Cell) -> Marks:
         x, y, longest = cell[0] + 14, cell[1], cell[2] - 28 - _NUMBER
         title = svg.text((x, y + 26), "Two kinds of error", "title")
         if self.adjustment is None:
-            return title + svg.paragraph((x, y + 56), NOTHING, cell[2] - 28, "label")
+            return title + svg.paragraph((x, y + 56), NO_BOARD, cell[2] - 28, "label")
         bars = [("on the boards it was fitted to", self.adjustment.rms, "fill-blue")]
         bars += [("on boards it has not seen", self.held_out, "fill-red")] if np.isfinite(self.held_out) else []
         mark = 0.0 if self.seen is not None or self.noise < _LOW else longest * _share(np.sqrt(2) * self.noise)
         parts = [_bar(x, y + 40 + 64 * i, longest, *bar, mark) for i, bar in enumerate(bars)]
-        return title + (self._noise_mark(x + mark, y) if mark else "") + "".join(parts)
+        return title + (self._noise_mark(x + mark, y) if mark else NOTHING) + svg.join(parts)
 
-    def _noise_mark(self, x: float, y: float) -> str:
+    def _noise_mark(self, x: float, y: float) -> Marks:
         """What the noise alone would leave: √2 times its standard deviation in u and v."""
         mark = svg.segments([(x, y + 60), (x, y + 124)], [(x, y + 84), (x, y + 148)], "ink")
         return mark + svg.text((x, y + 166), "noise alone", "tick middle")
 
     # Each board -------------------------------------------------------------------------------------------------------
 
-    def _each_board(self, cell: Cell) -> str:
+    def _each_board(self, cell: Cell) -> Marks:
         x, y, width, height = cell[0] + 14, cell[1], cell[2] - 28, min(cell[3], 250)
         title = svg.text((x, y + 26), "RMS error of each board", "title")
         if self.adjustment is None:
-            return title + svg.paragraph((x, y + 56), NOTHING, width, "label")
+            return title + svg.paragraph((x, y + 56), NO_BOARD, width, "label")
         errors, foot, full = self.per_board, y + height - 26, height - 90
         top, step = max(np.nanmax(errors, initial=0), 1e-9), min(40.0, width / len(errors))
         parts = [title]
@@ -125,12 +126,12 @@ class ErrorBars(BoardPictures):
         if np.isfinite(errors[self.index]):
             words = f"board {self.index + 1}: {_digits(errors[self.index])} px"
             parts.append(svg.text((x + width, y + 52), words, "number end halo"))
-        return "".join(parts) + self._your_marks(x, foot, step, full / top, width)
+        return svg.join(parts) + self._your_marks(x, foot, step, full / top, width)
 
-    def _your_marks(self, x: float, foot: float, step: float, scale: float, width: float) -> str:
+    def _your_marks(self, x: float, foot: float, step: float, scale: float, width: float) -> Marks:
         """The reader's RMS errors as lines across the bars; where the function is not written, the right ones."""
         if self.your_rms is None:
-            return ""
+            return NOTHING
         found = [self._by_your_rms(i) for i in range(self.count)]
         problem = next((problem for _, problem in found if problem), "")
         if problem and not is_unwritten(problem):
@@ -142,7 +143,7 @@ class ErrorBars(BoardPictures):
         lines = svg.segments(*ends, "paper-line") + svg.segments(*ends, "orange thick")
         name = svg.text((x, foot - scale * np.nanmax(self.per_board) - 8), "lines: your function", "note orange")
         words = svg.text((x + width / 2, foot - 60), YOURS_HERE, "title halo middle")
-        return svg.group(lines, class_="awaited") + words if problem else lines + name
+        return svg.group(lines, "awaited") + words if problem else lines + name
 
     # fx over Z --------------------------------------------------------------------------------------------------------
 
@@ -156,35 +157,35 @@ class ErrorBars(BoardPictures):
         f, z = camera.intrinsics.fx, transform(poses[self.index], middle_of(self.board))[2]
         return f"{number('fx', f)} / {z:.3f} m = {f / z:.0f}"
 
-    def _facts(self, x: float, y: float) -> str:
+    def _facts(self, x: float, y: float) -> Marks:
         """The quotient that the picked board shows."""
         lines = [svg.text((x, y + 28 + 28 * i), words, "number") for i, words in enumerate(self.levers())]
-        return svg.text((x, y), f"fx / Z of board {self.index + 1}, px/m", "note") + "".join(lines)
+        return svg.text((x, y), f"fx / Z of board {self.index + 1}, px/m", "note") + svg.join(lines)
 
 
-def _bar(x: float, y: float, longest: float, words: str, value: float, class_: str, mark: float) -> str:
+def _bar(x: float, y: float, longest: float, words: str, value: float, class_: str, mark: float) -> Marks:
     """An error in pixels as a bar, with its name above it and its number at its end, or beyond a mark close to it."""
     length = longest * _share(value)
     end = mark if length < mark < length + _NUMBER else length
     return (
         svg.text((x, y + 12), words, "label")
-        + svg.rectangle(x, y + 22, length, 20, class_, rx=2)
+        + svg.rectangle(x, y + 22, length, 20, class_, radius=2)
         + svg.text((x + 6 + end, y + 37), f"{_digits(value)} px", "number halo")
     )
 
 
-def _large_bar(x: float, y: float, width: float, words: str, share: float, class_: str) -> str:
+def _large_bar(x: float, y: float, width: float, words: str, share: float, class_: str) -> Marks:
     """A bar as long as its share of the longest, with its name above it; an arrow where it would be longer."""
     longest = width - _NUMBER
     length = longest * float(np.clip(share, 0.008, 1))
-    bar = svg.rectangle(x, y + 22, length, 26, class_, rx=2)
+    bar = svg.rectangle(x, y + 22, length, 26, class_, radius=2)
     if share > 1:
         tip = [(x + longest, y + 22), (x + longest + 13, y + 35), (x + longest, y + 48)]
         bar += svg.polygon(tip, class_)
-    return (svg.text((x, y + 14), words, "label") if words else "") + bar
+    return (svg.text((x, y + 14), words, "label") if words else NOTHING) + bar
 
 
-def _large_number(x: float, y: float, width: float, share: float, words: str, colour: str = "") -> str:
+def _large_number(x: float, y: float, width: float, share: float, words: str, colour: str = "") -> Marks:
     at = x + (width - _NUMBER) * float(np.clip(share, 0.008, 1)) + (18 if share > 1 else 8)
     return svg.text((at, y + 42), words, f"title {colour}".strip())
 

@@ -10,11 +10,12 @@ import numpy as np
 from camviz.cameras import Camera
 from camviz.draw import svg
 from camviz.draw.flow import Cell
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel
 from camviz.draw.readout import signed
 from camviz.lenses import BrownConrady
 from camviz_school.views.board_pictures import FREE, INTRINSICS
-from camviz_school.views.error_bars import NOTHING, PIXELS, ErrorBars, number
+from camviz_school.views.error_bars import NO_BOARD, PIXELS, ErrorBars, number
 
 _REACH = 300.0  # pixels at the ends of the strip
 _ROW, _LINE = 22, 26  # units, from one estimate to the next: in the strip, in the table
@@ -29,13 +30,13 @@ class EstimateNumbers(ErrorBars):
         """The camera whose lens and principal point are taken as known: the true one, or that which was estimated."""
         return self.truth or self.camera or self._true_camera
 
-    def _estimates(self, cell: Cell) -> str:
+    def _estimates(self, cell: Cell) -> Marks:
         left, y, width, _ = cell
         heads = ("", "true" if self.truth else "", "estimate", "± σ")
         x = (left + 14, *(left + 14 + share * (width - 28) for share in (0.4, 0.7, 1.0)))
         parts = [svg.text((x[0], y + 26), "The estimate", "title")]
         if self.adjustment is None:
-            return parts[0] + svg.paragraph((x[0], y + 56), NOTHING, width - 28, "label")
+            return parts[0] + svg.paragraph((x[0], y + 56), NO_BOARD, width - 28, "label")
         parts += [svg.text((at, y + 54), words, "label end") for at, words in zip(x, heads, strict=True)]
         for row, name in enumerate(FREE[self.free]):
             below = y + 82 + _LINE * row
@@ -43,9 +44,9 @@ class EstimateNumbers(ErrorBars):
             parts.append(svg.text((x[0], below), name, "number"))
             words = (number(name, self.true[name]) if self.truth else "", number(name, value), spread(name, sigma))
             parts += [svg.text((at, below), one, "number end") for at, one in zip(x[1:], words, strict=True)]
-        return "".join(parts)
+        return svg.join(parts)
 
-    def _strip(self, cell: Cell) -> str:
+    def _strip(self, cell: Cell) -> Marks:
         """Every estimate's distance from the truth with ± σ and ± 2σ, in pixels on a scale that is linear near 0."""
         x, y, width, _ = cell
         panel = Panel("estimates", x + 46, y + 46, width - 60, _ROW * len(INTRINSICS), -1, 1, 0, len(INTRINSICS))
@@ -65,15 +66,15 @@ class EstimateNumbers(ErrorBars):
         ]
         note = svg.text((panel.x + panel.width, below + 38), "k and p: at the image’s corner", "note end")
         title = svg.text((x + 14, y + 26), "Estimate less truth ± σ, px" if self.truth else "σ and 2σ, px", "title")
-        return title + panel.show("".join(lines + dots)) + "".join(names + ticks) + note
+        return title + panel.show(svg.join(lines + dots)) + svg.join(names + ticks) + note
 
-    def _dot(self, panel: Panel, name: str, row: int) -> str:
+    def _dot(self, panel: Panel, name: str, row: int) -> Marks:
         value, sigma = self.estimates.get(name, (np.nan, np.nan))
         unit = self._pixels_per[name]
         error = (value - self.true[name]) * unit if self.truth else 0.0
         free = name in FREE[self.free]
         if not np.isfinite(error) or (not free and not self.truth):
-            return ""
+            return NOTHING
         reach = _squeezed(error + np.array([-2, 2, -1, 1, 0]) * sigma * unit)
         (a, y), (b, _), (c, _), (d, _), at = panel.place(np.stack([reach, np.full(5, row + 0.5)], axis=-1))
         if not free:

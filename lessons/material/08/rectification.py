@@ -16,6 +16,7 @@ import numpy as np
 from camviz.cameras import Camera
 from camviz.draw import svg
 from camviz.draw.flow import Cell, rows
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, true_minus
@@ -163,9 +164,9 @@ class RectificationView(TurningPair):
         beside, below = (76, 24) if name in ("disparity", "second") else (0, 0)
         return image_in((x, y, width - beside, height - below), name, size.width, size.height)
 
-    def _picture_panel(self, name: str) -> str:
+    def _picture_panel(self, name: str) -> Marks:
         panel, now = self._image_panel(name), getattr(self.stage, name)
-        content = "".join([
+        content = svg.join([
             placed_image(panel, name, now.intrinsics.width, now.intrinsics.height),
             self._pencil(panel, now),
             self._same_row(panel),
@@ -184,17 +185,17 @@ class RectificationView(TurningPair):
         uv = np.stack(np.broadcast_arrays(u, rows[:, None]), axis=-1)
         return clipped(panel, panel.place(seen_from_there(now, self.stage.pair.left, uv)))
 
-    def _pencil(self, panel: Panel, now: Camera) -> str:
+    def _pencil(self, panel: Panel, now: Camera) -> Marks:
         height = self.stage.pair.left.intrinsics.height
         lines = self._epipolar(panel, now, np.linspace(-0.5, 1.5, 2 * _ROWS + 1) * height)
         return svg.segments(lines[:, 0], lines[:, 1], "yellow thin half")
 
-    def _same_row(self, panel: Panel) -> str:
+    def _same_row(self, panel: Panel) -> Marks:
         """The left mark's row in both pictures: where a matcher looks, whether the partner is there or not."""
         v = panel.place(self.uv_left)[1]
         return on_photograph([[(0, v), (panel.width, v)]], "orange dashed")
 
-    def _mark(self, panel: Panel) -> str:
+    def _mark(self, panel: Panel) -> Marks:
         at = panel.place(self.uv_left if panel.name == "left" else self.uv_right)
         return ring(at, "red", 8) + svg.dots([at], "red", 5)
 
@@ -208,12 +209,12 @@ class RectificationView(TurningPair):
         title = "Depth" if self.show == "depth" else "True depth"
         return "depth", title, *stereo_pair.depth_limits(self.source), "m"
 
-    def _map(self, name: str, low: float, high: float, unit: str, **heading: str) -> str:
+    def _map(self, name: str, low: float, high: float, unit: str, **heading: str) -> Marks:
         """The map that is attached by that name, where it is shown, and below it what the hatching means."""
         if not self._has(name):
-            return ""
+            return NOTHING
         panel, size = self._image_panel(name), self.stage.left.intrinsics
-        mark = ring(panel.place(self.uv_left), "red", 5) if {"left", "right"} & set(self._panels.split()) else ""
+        mark = ring(panel.place(self.uv_left), "red", 5) if {"left", "right"} & set(self._panels.split()) else NOTHING
         hatched = svg.text((panel.x, panel.y + panel.height + 18), "hatched: nothing found", "note")
         return heat_panel(panel, size.width, size.height, low, high, unit, mark, **heading) + hatched
 
@@ -223,7 +224,7 @@ class RectificationView(TurningPair):
         note = "" if self.source.photographs is None or self.source.distances is not None else "truth unknown"
         if self.show == "depth":
             formula = "Z = fB / (d + doffs)" if abs(self.stage.doffs) > 0.05 else "Z = fB / d"
-            note = formula if self._has("disparity") else ""
+            note = formula if self._has("disparity") else NOTHING
         drawn = {
             "disparity": self._map("disparity", 0, self.disparities, "px", title="Disparity", note=self.method),
             "second": self._map("second", low, high, unit, title=title, note=note),
@@ -258,7 +259,7 @@ class RectificationView(TurningPair):
         drawn = {"disparity": self._map("disparity", *limits, "m", title="Depth"), "second": own}
         return drawn, images | dict.fromkeys(("disparity key", "second key"), heat_key("depth"))
 
-    def _wedge_panel(self) -> str:
+    def _wedge_panel(self) -> Marks:
         farthest = stereo_pair.depth_limits(self.source)[1]
         notes = (self.equation(), self.interval())
         x, y, width, height = self._layout[_TILES["wedge"]]

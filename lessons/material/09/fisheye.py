@@ -17,6 +17,7 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.draw import plot, svg
 from camviz.draw.flow import WIDTH, Cell, rows, shortened
 from camviz.draw.items import Dots, Item, Line, axes_triad, closed
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, true_minus
@@ -195,7 +196,7 @@ class FisheyeView(OrbitView):
     def _panel(self) -> Panel:
         return image_in(self._layout["picture"], "fisheye", SIDE, SIDE)
 
-    def _picture_panel(self) -> str:
+    def _picture_panel(self) -> Marks:
         panel = self._panel
         content = placed_image(panel, "fisheye", SIDE, SIDE)
         content += self._grid_lines(panel) if self.yours else self._beside(panel)
@@ -210,35 +211,35 @@ class FisheyeView(OrbitView):
         label = "The fisheye's picture; drag it, or press the arrow keys, to move the window; plus and minus zoom"
         return panel.show(content, title=title, hint="drag the window", drag="window", label=label)
 
-    def _window_panel(self) -> str:
+    def _window_panel(self) -> Marks:
         panel = image_in(self._layout["window"], "cut", 320, 240)
         note = f"perspective, {self.hfov_deg:.0f}° wide"
         return panel.show(placed_image(panel, "window", 320, 240), title="The window cut out of it", note=note)
 
-    def _curves_panel(self) -> str:
+    def _curves_panel(self) -> Marks:
         x, y, width, height = self._layout["curves"]
         around = x + 60, y + 34, width - 70, height - 82
         panel = plot.plot_panel("curves", *around, (0, 180), (-1.8 if self.yours else 0, _TOP))
         edge = SIDE / 2 / self.f
         drawn = plot.grid(panel) + plot.upright(panel, 90, "muted dashed")
-        drawn += svg.line(panel.place([(0, edge), (180, edge)]), "green dashed") if edge < _TOP else ""
+        drawn += svg.line(panel.place([(0, edge), (180, edge)]), "green dashed") if edge < _TOP else NOTHING
         names = sorted(LENSES, key=lambda name: name == self.projection) if not self.yours else [self.projection]
         for name in names:
             theta = np.linspace(0, _LAST[name], 181)
             radius = self.radius(np.radians(theta), name)
             drawn += plot.curve(panel, theta, radius, f"{_COLOURS[name]} {self._weight(name)}")
-        drawn += self._your_curve(panel) if self.yours else "".join(self._name(panel, name) for name in names)
+        drawn += self._your_curve(panel) if self.yours else svg.join(self._name(panel, name) for name in names)
         if edge < 0.92 * _TOP and not self.yours:
             drawn += svg.text(panel.place((2, edge)) + (0, -6), "edge of the picture", "green halo")
         return plot.axes(panel, "θ, angle from the axis [°]", "r / f") + panel.show(
             drawn, title="How far from the middle", note=EQUATIONS[self.projection]
         )
 
-    def _beside(self, panel: Panel) -> str:
+    def _beside(self, panel: Panel) -> Marks:
         """The circle of the rays from beside the camera, where the picture has it."""
         c, r = (SIDE - 1) / 2, self.f * float(self.radius(np.array(pi / 2)))
         if not r < c:
-            return ""
+            return NOTHING
         turn = np.linspace(0, 2 * pi, 121)
         ring = panel.place(c + r * np.stack([np.cos(turn), np.sin(turn)], axis=-1))
         return on_photograph([ring], "yellow dashed") + svg.text(
@@ -253,7 +254,7 @@ class FisheyeView(OrbitView):
         uv, problem = answered(self.yours, (points, k.fx, k.cx, k.cy), points[..., :2])
         return np.where(np.abs(uv) < _FAR, uv, np.nan), problem
 
-    def _grid_lines(self, panel: Panel) -> str:
+    def _grid_lines(self, panel: Panel) -> Marks:
         """Circles every 30° around the axis, and twelve lines out from it: where they land, and by the reader's own."""
         turn = np.linspace(0.01, 2 * pi + 0.01, 73)
         reach = np.radians(np.linspace(2, min(self.half_field_deg(), 150), 73))
@@ -266,7 +267,7 @@ class FisheyeView(OrbitView):
         right = svg.path(panel.place(self.camera.project(lines)), "yellow thin")
         return right + svg.path(panel.place(yours), "orange dashed")
 
-    def _your_curve(self, panel: Panel) -> str:
+    def _your_curve(self, panel: Panel) -> Marks:
         """r/f by the reader's function, of rays to the right, and what the lines are."""
         theta = np.linspace(1, 179, 179)  # neither on the axis nor straight behind, where no direction is told
         entries = [(_COLOURS[self.projection], self.projection), ("orange dashed", "yours"), ("green dashed", "edge")]
@@ -288,7 +289,7 @@ class FisheyeView(OrbitView):
     def _weight(self, name: str) -> str:
         return "thick" if name == self.projection else "half"
 
-    def _name(self, panel: Panel, name: str) -> str:
+    def _name(self, panel: Panel, name: str) -> Marks:
         places = {
             "perspective": (69, 2.95, "end"),
             "stereographic": (117, 2.95, ""),
@@ -297,10 +298,10 @@ class FisheyeView(OrbitView):
             "orthographic": (92, 0.72, ""),
         }
         x, y, side = places[name]
-        return svg.text(panel.place((x, y)), name, f"{_COLOURS[name]} halo {side}", style=self._bold(name))
+        return svg.text(panel.place((x, y)), name, f"{_COLOURS[name]} halo {side}", **self._bold(name))
 
-    def _bold(self, name: str) -> str | None:
-        return "font-weight:600" if name == self.projection else None
+    def _bold(self, name: str) -> dict[str, int]:
+        return {"font_weight": 600} if name == self.projection else {}
 
     # The dome --------------------------------------------------------------------------------------------------------
 
@@ -329,7 +330,7 @@ class FisheyeView(OrbitView):
 
     # The numbers -----------------------------------------------------------------------------------------------------
 
-    def _numbers(self) -> str:
+    def _numbers(self) -> Marks:
         x = self._layout["numbers"][0] + 10
         law = svg.text((x, 50), EQUATIONS[self.projection]) + svg.text((x, 70), f"f = {self.f:g} px")
         return svg.text((x, 26), "This lens", "title") + law + readout(self._told(), (x, 104), (0, 42), (0, 17))

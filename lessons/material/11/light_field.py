@@ -15,6 +15,7 @@ import numpy as np
 
 from camviz.draw import plot, svg
 from camviz.draw.flow import WIDTH, Cell, rows, shortened
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg, png
 from camviz.draw.readout import listed, readout, signed
@@ -136,7 +137,7 @@ class LightFieldView(RefocusedField):
         key = 60 if self.show == "slopes" else 0  # the room it takes
         return image_panel("picture", x, y, across - key, width, height, tallest=tallest)
 
-    def _picture_panel(self, attached: dict[str, bytes]) -> str:
+    def _picture_panel(self, attached: dict[str, bytes]) -> Marks:
         panel, (height, width) = self._image_panel, self.views.shape[2:4]
         across = panel.place([(panel.left, self.row), (panel.right, self.row)])
         here = panel.place((self.column, self.row))
@@ -160,12 +161,12 @@ class LightFieldView(RefocusedField):
         far = float(self.light_field.depth(self.slope))
         return f"Focused at {metres(far)}" if far > 0 else "Focused by the slope"
 
-    def _row_handle(self, left_end: Array) -> str:
+    def _row_handle(self, left_end: Array) -> Marks:
         grip = svg.rectangle(left_end[0], left_end[1] - 9, 16, 18, "paper half") + svg.polygon(
             left_end + np.array([(2, 0), (13, -8), (13, 8)]), "fill-yellow"
         )
         label = "The slice's row; drag or press the arrow keys to move it"
-        return svg.group(grip, data_drag="row", tabindex=0, role="group", aria_label=label)
+        return svg.handle(grip, "row", label)
 
     @property
     def _slice_row(self) -> int:
@@ -173,11 +174,11 @@ class LightFieldView(RefocusedField):
         rows, height = self.views.shape[0], self.views.shape[2]
         return int(np.clip(round(self.row - self.slope_here * (self.v - (rows - 1) / 2)), 0, height - 1))
 
-    def _slice_panel(self) -> str:
+    def _slice_panel(self) -> Marks:
         width, columns = self.views.shape[3], self.views.shape[1]
         x, y, across, height = self._slot("slice")
         panel = Panel("slice", x, y, across, height, -0.5, width - 0.5, -0.5, columns - 0.5)
-        seen = svg.image("slice", 0, 0, panel.width, panel.height, style="image-rendering:pixelated")
+        seen = svg.image("slice", 0, 0, panel.width, panel.height, image_rendering="pixelated")
         u = np.array([-0.5, columns - 0.5])
         steps = u - (columns - 1) / 2
         found, sheared = (
@@ -200,7 +201,7 @@ class LightFieldView(RefocusedField):
         x, y, across, tallest = self._slot("views")
         return image_panel("views", x, y, across, columns * width, rows * height, tallest=tallest)
 
-    def _views_panel(self) -> str:
+    def _views_panel(self) -> Marks:
         panel = self._mosaic_panel
         rows, columns = self.views.shape[:2]
         cell = np.array([panel.width / columns, panel.height / rows])
@@ -213,7 +214,7 @@ class LightFieldView(RefocusedField):
         seen = svg.image("views", 0, 0, panel.width, panel.height)
         label = "All views; click or press the arrow keys to choose one"
         dark = "" if self.mask.all() else "dark: not summed"
-        return panel.show(seen + "".join(closed) + chosen, title="All views", note=dark, drag="viewpoint", label=label)
+        return panel.show(seen + svg.join(closed) + chosen, title="All views", note=dark, drag="viewpoint", label=label)
 
     def _window(self) -> tuple[slice, slice]:
         """The rows and columns of microlenses drawn, around the mark."""
@@ -226,12 +227,12 @@ class LightFieldView(RefocusedField):
         down, across = self._window()
         return to_microlens_image(_bytes(self.light_field.views[:, :, down, across]))
 
-    def _sensor_panel(self) -> str:
+    def _sensor_panel(self) -> Marks:
         down, across = self._window()
         x, y, width, _ = self._slot("sensor")
         edges = (across.start - 0.5, across.stop - 0.5, down.start - 0.5, down.stop - 0.5)
         panel = Panel("sensor", x, y, width, 0.75 * width, *edges)
-        seen = svg.image("sensor", 0, 0, panel.width, panel.height, style="image-rendering:pixelated")
+        seen = svg.image("sensor", 0, 0, panel.width, panel.height, image_rendering="pixelated")
         upright = [[(x - 0.5, panel.top), (x - 0.5, panel.bottom)] for x in range(across.start, across.stop)]
         level = [[(panel.left, y - 0.5), (panel.right, y - 0.5)] for y in range(down.start, down.stop)]
         rims = svg.path([panel.place(line) for line in upright + level], "grid")
@@ -245,7 +246,7 @@ class LightFieldView(RefocusedField):
     def _plot(self) -> Panel:
         return plot.plot_panel("depth", *self._slot("depth"), self.limits, (1.0, 12.0))
 
-    def _depth_panel(self) -> str:
+    def _depth_panel(self) -> Marks:
         panel, field = self._plot, self.light_field
         slopes = np.linspace(*self.limits, 139)
         within = lambda slope: (slope, np.clip(np.nan_to_num(field.depth(slope), nan=99), 1.3, 11.6))  # noqa: E731
@@ -259,17 +260,17 @@ class LightFieldView(RefocusedField):
         named = plot.axes(panel, "slope d, pixels a view", "depth, m")
         return named + panel.show(content, title="Slope is depth", note=self.equation(), drag="slope", label=label)
 
-    def _exact_range(self) -> str:
+    def _exact_range(self) -> Marks:
         """The slopes at which no view is blurred by more than a pixel, where openings bound them."""
         panel, bound = self._plot, 1 / self.opening if self.opening else np.inf
         left, right = (float(np.clip(end, *self.limits)) for end in (-bound, bound))
         if (left, right) == self.limits:
-            return ""
+            return NOTHING
         x = panel.place([(left, panel.top), (right, panel.top)])[:, 0]
         words = svg.text((x.mean(), panel.height - 8), "exact: |d| ≤ 1 px", "note fill-ink middle")
         return svg.rectangle(x[0], 0, x[1] - x[0], panel.height, "wash fill-green") + words * (self.opening == 1)
 
-    def _numbers(self) -> str:
+    def _numbers(self) -> Marks:
         x, y, _, _ = self._layout["numbers"]
         heading = svg.text((x + 10, y + 26), "This picture, and its light field", "title")
         return heading + readout(self._told(), (x + 10, y + 52), (0, 21), (145, 0))
@@ -288,15 +289,15 @@ class LightFieldView(RefocusedField):
     def _your_slope(self) -> float:
         return float(self._your_slopes[1][-1])
 
-    def _your_curve(self, panel: Panel) -> str:
+    def _your_curve(self, panel: Panel) -> Marks:
         if not self.yours:
-            return ""
+            return NOTHING
         depths, slopes, _ = self._your_slopes
         lines = [("blue thick", "right"), ("orange dashed", "yours")]
         drawn = np.stack([np.clip(slopes[:-1], -99, 99), depths[:-1]], axis=-1)
         return svg.line(panel.place(drawn), "orange thick dashed") + plot.legend(panel, lines, "top right")
 
-    def _your_panel(self, attached: dict[str, bytes]) -> str:
+    def _your_panel(self, attached: dict[str, bytes]) -> Marks:
         """The picture once more, sheared by the slope that the reader's function gives for the same depth."""
         x, y, across, tallest = self._slot("yours")
         height, width = self.views.shape[2:4]

@@ -19,6 +19,7 @@ from camviz.colour.spaces import chromaticity, to_srgb, tristimulus
 from camviz.colour.temperature import temperature, xy_of_temperature
 from camviz.draw import plot, svg
 from camviz.draw.flow import WIDTH, Cell, rows, shortened
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, true_minus
@@ -190,7 +191,7 @@ class ColourView(View):
             matrix, problem = tried(self.yours, (balanced, target), matrix)
         return developed(raw, gains, matrix, encoded=self.gamma != "at the end"), problem
 
-    def _your_chart(self) -> str:
+    def _your_chart(self) -> Marks:
         """The chart by the reader's function, or the right one, greyed, or what is wrong."""
         (rgb, problem), panel, title = self.your_chart, self._chart_panel("your chart"), "With your function"
         if problem:
@@ -271,26 +272,26 @@ class ColourView(View):
         encoded = to_display(surfaces @ self.shot.raw_from_srgb.T) @ (self.correction * self.gains).T
         return np.clip(encoded + 0.5, 0, 255).astype(np.uint8)
 
-    def _light_panel(self) -> str:
+    def _light_panel(self) -> Marks:
         panel = self._spectrum_panel("light", 108)
         lines = plot.grid(panel) + plot.curve(panel, spectra.WAVELENGTHS_NM, self.power, "ink")
         strip = swatches.rainbow(panel, self.power)
         note = self.light if self.light in LAMPS else ""
         return plot.axes(panel, "wavelength in nm", "power") + panel.show(strip + lines, title="The light", note=note)
 
-    def _surface_panel(self) -> str:
+    def _surface_panel(self) -> Marks:
         panel = self._spectrum_panel("surface", 1.05)
         curves = zip(self.reflectances, ("blue", "orange dashed"), strict=False)
         lines = [plot.curve(panel, spectra.WAVELENGTHS_NM, one, class_) for one, class_ in curves]
         note = "dashed: its metamer" if self.metamer else spectra.patch_names()[self.patch]
         title = "× two surfaces" if self.metamer else "× a surface"
-        content = plot.grid(panel) + "".join(lines)
+        content = plot.grid(panel) + svg.join(lines)
         return plot.axes(panel, "wavelength in nm", "reflected") + panel.show(content, title=title, note=note)
 
-    def _sensor_panel(self) -> str:
+    def _sensor_panel(self) -> Marks:
         panel = self._spectrum_panel("sensor", 1.9 if self.camera == "CIE observer" else 1.1)
         channels = zip(self.shot.sensitivity.T, ("red thick", "green dashed", "blue"), strict=True)
-        content = "".join(plot.curve(panel, spectra.WAVELENGTHS_NM, one, class_) for one, class_ in channels)
+        content = svg.join(plot.curve(panel, spectra.WAVELENGTHS_NM, one, class_) for one, class_ in channels)
         shown = panel.show(plot.grid(panel) + content, title="× a sensor", note=self.camera)
         return plot.axes(panel, "wavelength in nm", "sensitivity") + shown
 
@@ -302,35 +303,35 @@ class ColourView(View):
         x, y, *_ = self._layout[name]
         return Panel(name, x + 10, y + 34, 390, 252, 0, 6, 0, 4)
 
-    def _chart(self) -> str:
+    def _chart(self) -> Marks:
         panel, label = self._chart_panel(), "Choose a patch of the chart: click it or press the arrow keys"
         shown = swatches.chart(panel, self.chart, self.shot.true_chart, self.errors, self.patch)
         heading = {"title": "The chart", "hint": "click a patch", "drag": "chart", "label": label}
         return panel.show(shown, **heading) + self._key(panel, self.errors)
 
-    def _key(self, panel: Panel, off: np.ndarray) -> str:
+    def _key(self, panel: Panel, off: np.ndarray) -> Marks:
         key = f"Above: camera. Below: your eye.\nNumber: ΔE2000, {off.mean():.2f} on average"
         return svg.paragraph((panel.x, panel.y + panel.height + 18), key, panel.width)
 
-    def _photograph_panel(self, photographs: dict[str, bytes], draft: bool, name: str) -> str:
+    def _photograph_panel(self, photographs: dict[str, bytes], draft: bool, name: str) -> Marks:
         """A photograph, which goes to those attached: the reader's own, or the right one, greyed, where it waits."""
         image, title = self.image(draft=draft), "Developed in the same way"
         if name != "photograph":
             raw = self._surfaces(_DRAFT if draft else _FINE) @ self.shot.raw_from_srgb.T
             (rgb, problem), title = self.your_way(raw), "With your function"
             if problem and not is_unwritten(problem):
-                return ""
+                return NOTHING
             image = faded(image) if problem else to_display(rgb)
         photographs[name] = jpeg(image)
         height, width = image.shape[:2]
         panel = image_in(self._layout[name], name, width, height)
         return panel.show(placed_image(panel, name, width, height), title=title)
 
-    def _figures(self) -> str:
+    def _figures(self) -> Marks:
         x, y = self._layout["figures"][0] + 10, self._layout["figures"][1]
         return svg.text((x, y + 26), "In numbers", "title") + readout(self._told(), (x, y + 48), (0, 36), (0, 17))
 
-    def _steps(self) -> str:
+    def _steps(self) -> Marks:
         """The chosen patch on its way through: a colour and its numbers for each step."""
         raw = self.shot.raw(self.reflectances)
         seen = to_srgb(balance.seen(self.power, self.reflectances))

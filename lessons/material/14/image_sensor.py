@@ -17,6 +17,7 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.colour.spectra import ILLUMINANTS, WAVELENGTHS_NM, illuminant, sensitivities
 from camviz.draw import svg
 from camviz.draw.flow import Cell
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import axes, bars, between, curve, grid, legend, logarithmic, plot_panel
@@ -165,7 +166,7 @@ class ImageSensorView(View):
         }
         return self.tiled(self._layout, {name: draw[name]() for name in self._layout}, photographs)
 
-    def _photograph(self, width: int, photographs: dict[str, bytes]) -> str:
+    def _photograph(self, width: int, photographs: dict[str, bytes]) -> Marks:
         photographs["photograph"] = jpeg(self.shot(width).picture, 92)
         panel = image_in(self._layout["photograph"], "photograph", width, width * 3 // 4)
         return panel.show(placed_image(panel, panel.name, width, width * 3 // 4), title="What becomes of it")
@@ -174,7 +175,7 @@ class ImageSensorView(View):
     def _layout(self) -> dict[str, Cell]:
         return in_rows(_SIZES, self._has)
 
-    def _spectra(self) -> str:
+    def _spectra(self) -> Marks:
         left, top, *_ = self._layout["efficiency"]
         panel = plot_panel("efficiency", left + 64, top + 34, 426, 290, (380, 780), (0, 100))
         unfiltered = 100 * np.asarray(self.sensor.efficiency(WAVELENGTHS_NM))
@@ -187,7 +188,7 @@ class ImageSensorView(View):
             between(panel, WAVELENGTHS_NM, np.zeros(len(spectrum)), 96 * spectrum / spectrum.max(), "fill-muted")
             + grid(panel)
             + curve(panel, WAVELENGTHS_NM, unfiltered, f"ink {known}")
-            + "".join(curve(panel, WAVELENGTHS_NM, unfiltered * passed[:, i], c) for i, (_, c) in enumerate(CHANNELS))
+            + svg.join(curve(panel, WAVELENGTHS_NM, unfiltered * passed[:, i], c) for i, (_, c) in enumerate(CHANNELS))
             + svg.dots([panel.place((self.sensor.measured_at_nm, 100 * float(self.sensor.efficiency())))], "ink", 8)
             + legend(panel, lines, "bottom right")
         )
@@ -195,7 +196,7 @@ class ImageSensorView(View):
             content, title="Quantum efficiency", note=_MODELS[self.model].camera
         )
 
-    def _electrons(self) -> str:
+    def _electrons(self) -> Marks:
         """Electrons of each channel beside the full well and the threshold, on a logarithmic scale."""
         low, high = 0.0, float(np.log10(3 * _MOST_E))
         freed = dict(zip(("red", "green", "blue", "ink"), self.white_e, strict=True))
@@ -214,22 +215,22 @@ class ImageSensorView(View):
             if np.isnan(electrons):
                 continue
             content += bars(panel, left, right, top[:1], f"{class_} dotted")
-            content += "".join(bars(panel, left, right, top[1:], c) for c in (f"wash fill-{class_}", class_))
-        content += self._in_words(panel, len(names)) if self.yours else ""
+            content += svg.join(bars(panel, left, right, top[1:], c) for c in (f"wash fill-{class_}", class_))
+        content += self._in_words(panel, len(names)) if self.yours else NOTHING
         floor_e = self.sensor.threshold_photons() * float(self.sensor.efficiency())
         ends = (("full well", ",.0f", self.full_well, "orange"), ("threshold", ".1f", floor_e, "purple"))
         for name, form, electrons, class_ in ends:
             y = float(panel.place((0, np.log10(max(electrons, 1))))[1])
             content += svg.line([(0, y), (panel.width, y)], f"{class_} dashed")
             content += svg.text((panel.width - 6, y - 6), f"{name} {electrons:{form}} e⁻", f"{class_} halo end")
-        problem = svg.paragraph((x + 66, y + 270), placeholder(self.your_e[1]), 344) if self.yours else ""
+        problem = svg.paragraph((x + 66, y + 270), placeholder(self.your_e[1]), 344) if self.yours else NOTHING
         return (
             problem
             + axes(panel, "pixels of a white wall", "electrons", xticks, yticks, aside=54)
             + panel.show(content, title="Electrons in a pixel", note=f"{self.exposure_ms:g} ms, f/4, {SCENE_LUX:g} lux")
         )
 
-    def _in_words(self, panel: Panel, bar: int) -> str:
+    def _in_words(self, panel: Panel, bar: int) -> Marks:
         """The two counts in green light in their bars."""
         electrons, words = self.your_e[0], ""
         for i, (one, class_) in enumerate(((self.green_e, "tick"), (electrons, "orange"))):
@@ -238,12 +239,12 @@ class ImageSensorView(View):
                 words += svg.text(below, f"{float(f'{one:.3g}'):,.0f}", f"{class_} halo middle")
         return words
 
-    def _figures(self, tile: str) -> str:
+    def _figures(self, tile: str) -> Marks:
         """The numbers of the sensor, with where they are from, or those of what it takes."""
         (x, y, *_), figures = self._layout[tile], self.numbers()
         of_sensor = {name: figures.pop(name) for name in ("efficiency with fill factor", "full well", "converter")}
         title, told = ("This sensor", of_sensor) if tile == "sensor" else ("Its picture", figures)
-        source = svg.paragraph((x + 10, y + 166), _MODELS[self.model].source, 250) if tile == "sensor" else ""
+        source = svg.paragraph((x + 10, y + 166), _MODELS[self.model].source, 250) if tile == "sensor" else NOTHING
         return svg.text((x + 10, y + 26), title, "title") + readout(told, (x + 10, y + 50), (0, 38), (0, 17)) + source
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from camviz.draw import plot, svg
 from camviz.draw.flow import Cell, rows
+from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_in
 from camviz.draw.picture import Picture
 from camviz.draw.readout import listed, true_minus
@@ -125,7 +126,7 @@ class FaultLabView(ViewChooser):
         x, y, *_ = self._layout[tile]
         return x + right, y + down
 
-    def _headline(self) -> str:
+    def _headline(self) -> Marks:
         told = {"error of the fit": "RMS of all residuals", "believes to be off by": "1σ, by its covariance",
                 "is off by": "against the true camera"}  # fmt: skip
         parts = []
@@ -134,17 +135,17 @@ class FaultLabView(ViewChooser):
             x, y = self._corner("numbers", 10, 26 + 72 * i)
             parts.append(svg.text((x, y), name, "title"))
             parts.append(svg.text((x, y + 29), value, f"label{' red' if i == 2 and self._astray else ''}",
-                                  style="font-size:26px;font-weight:600"))  # fmt: skip
+                                  font_size=26, font_weight=600))  # fmt: skip
             parts.append(svg.text((x, y + 48), told[name], "note"))
         words = f"In this calibration, {self.experiment.words}." if self.strength else "A healthy calibration."
         words = words if self.told else "What is wrong here?"
         place = self._corner("numbers", 10, 32 + 72 * shown)
-        return "".join(parts) + svg.paragraph(place, words, 200, "label") + self._your_verdict()
+        return svg.join(parts) + svg.paragraph(place, words, 200, "label") + self._your_verdict()
 
-    def _your_verdict(self) -> str:
+    def _your_verdict(self) -> Marks:
         """What the reader's triage says of all residuals together."""
         if self.verdict is None:
-            return ""
+            return NOTHING
         residuals = self.experiment.residuals.reshape(VIEWS, BOARD.rows, BOARD.columns, 2)
         answer, problem = tried(self.verdict, (residuals,), 0.0)
         x, y = self._corner("numbers", 10, 322)
@@ -164,7 +165,7 @@ class FaultLabView(ViewChooser):
         tallest = 1.15 * max(float(np.nanmax(self.experiment.errors)), 3 * self.noise)
         return plot.plot_panel("bars", *self._corner("bars", 58, 34), 232, 288, (0.5, VIEWS + 0.5), (0, tallest))
 
-    def _bars_panel(self) -> str:
+    def _bars_panel(self) -> Marks:
         panel, errors = self._bars, self.experiment.errors
         x = np.arange(1, VIEWS + 1)
         content = plot.grid(panel, xticks=[])
@@ -178,17 +179,17 @@ class FaultLabView(ViewChooser):
         names = [(float(i), f"{i}") for i in x.tolist()]
         return shown + plot.axes(panel, "", "RMS [px]", xticks=names)
 
-    def _your_bars(self, panel: Panel, x: np.ndarray) -> str:
+    def _your_bars(self, panel: Panel, x: np.ndarray) -> Marks:
         """The reader's own bars beside the right ones; each that lies above the panel ends at its edge."""
         if self.yours is None:
-            return ""
+            return NOTHING
         answer, problem = tried(self.yours, (self.experiment.residuals,), self.experiment.errors)
         if problem:
             return svg.paragraph((10, 18), placeholder(problem), panel.width - 20, "note halo")
         names = [("blue thick", "RMS of the view"), ("orange thick", "yours")]
         return plot.bars(panel, x, x + 0.38, answer, "fill-orange") + plot.legend(panel, names)
 
-    def _image_panel(self) -> str:
+    def _image_panel(self) -> Marks:
         made, i = self.experiment, self.index
         k = made.camera.intrinsics
         panel = image_in(self._layout["residuals"], "picture", k.width, k.height)
@@ -207,14 +208,14 @@ class FaultLabView(ViewChooser):
         """How much longer arrows are than residuals: by the noise alone, so that a fault makes them grow."""
         return float(max(1, round(1.8 / self.noise) * 5))
 
-    def _estimates_panel(self) -> str:
+    def _estimates_panel(self) -> Marks:
         estimates = self.experiment.estimates
         values = np.array(list(estimates.values()))
         reach = 1.15 * max(float(np.max(np.abs(values[:, 0]) + values[:, 1])), 3.0)
         x, top = self._corner("estimates", 46, 34)
         panel = Panel("estimates", x, top, 150, 26.0 * len(estimates) + 6, -reach, reach, 0, len(estimates) + 0.2)
         content = svg.line(panel.place([(0, 0), (0, panel.bottom)]), "ink")
-        beside = ""
+        beside = NOTHING
         for i, (name, (error, sigma)) in enumerate(estimates.items()):
             y, far = i + 0.6, abs(error) > _FAR * sigma
             class_ = "red" if far else "green"
@@ -226,14 +227,14 @@ class FaultLabView(ViewChooser):
             beside += svg.text((panel.x + panel.width + 10, level), words, class_)
         shown = panel.show(content, title="Estimate ± 1σ, less the truth")
         ticks = [(float(t), true_minus(f"{t:g}")) for t in plot.ticks(-reach, reach, 3)]
-        below = "".join(
+        below = svg.join(
             svg.text((panel.x + px, panel.y + panel.height + 16), words, "tick middle")
             for px, (_, words) in zip(panel.place([(t, 0) for t, _ in ticks])[:, 0], ticks, strict=True)
         )
         note = "In pixels; k1 and k2 at the corner. Red: more than 4σ off."
         return shown + beside + below + svg.paragraph((x - 36, panel.y + panel.height + 38), note, 310)
 
-    def _findings(self, draft: bool) -> list[str]:
+    def _findings(self, draft: bool) -> list[Marks]:
         """What the clinic finds, a tile for each, the worst first."""
         (x, y), whole = self._corner("findings", 10, 26), _WIDE["findings"]
         room = whole - 20
@@ -243,11 +244,11 @@ class FaultLabView(ViewChooser):
                 head + svg.paragraph((x, y + 30), "Hidden. Make your diagnosis, then switch them on.", room, "label")
             ]
         if draft:
-            return [head + svg.text((x, y + 34), "measuring …", "label", style="font-size:20px")]
+            return [head + svg.text((x, y + 34), "measuring …", "label", font_size=20)]
         inspection = self.experiment.inspection
         if not inspection.findings:
             words = f"{len(inspection.checked)} checks were made."
-            return [head + svg.text((x, y + 36), "Nothing found.", "green", style="font-size:22px;font-weight:600")
+            return [head + svg.text((x, y + 36), "Nothing found.", "green", font_size=22, font_weight=600)
                     + svg.paragraph((x, y + 62), words, room)]  # fmt: skip
         found = grouped(inspection.findings)
         width = whole / min(len(found), _MOST)
@@ -257,7 +258,7 @@ class FaultLabView(ViewChooser):
             tiles[-1] += svg.text((x + width * (_MOST - 1), y), more, "note")
         return [head + tiles[0], *tiles[1:]]
 
-    def _finding(self, x: float, y: float, width: float, finding: Finding, count: int) -> str:
+    def _finding(self, x: float, y: float, width: float, finding: Finding, count: int) -> Marks:
         times, colour = f" × {count}" if count > 1 else "", _COLOURS[finding.severity]
         return (
             svg.rectangle(x, y - 14, 4, 60 + 154 * _WIDE["findings"] / width / _MOST, f"fill-{colour}")

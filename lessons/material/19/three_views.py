@@ -17,6 +17,7 @@ from camviz import twoview
 from camviz.cameras import Camera, Intrinsics, look_at, transform
 from camviz.draw import svg
 from camviz.draw.flow import Cell, rows, shortened
+from camviz.draw.marks import Marks
 from camviz.draw.panel import image_panel, placed_image
 from camviz.draw.picture import Picture
 from camviz.draw.readout import listed, readout
@@ -130,14 +131,14 @@ class ThreeViews(OrbitView):
         high = 44 + 0.75 * (across["picture"] - 20)
         return shortened(rows((max(high, 370), {name: across[name] for name in shown})), picture=high, space=high)
 
-    def _third_picture(self) -> str:
+    def _third_picture(self) -> Marks:
         """Rings where the third picture has the points, and crosses where the chain of two pairs expects them."""
         panel = image_panel("third", 10, 34, self._layout["picture"][2] - 20, 640, 480)
         at = panel.place(true_scene().seen[2])
         ends = at + panel.scale * self.errors[2]
         colour = "muted" if self._waits else "orange" if self.yours is not None else "red"
         marks = on_photograph(np.stack([at, ends], axis=1), f"{colour} thin") + cross(ends, colour, 4)
-        content = placed_image(panel, "third", 640, 480) + "".join(ring(one, "green", 6) for one in at) + marks
+        content = placed_image(panel, "third", 640, 480) + svg.join(ring(one, "green", 6) for one in at) + marks
         content += notice(panel, self.your_length[1])
         return panel.show(content, title="The third picture")
 
