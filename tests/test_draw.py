@@ -13,33 +13,35 @@ from camviz.draw.gallery import side_by_side
 from camviz.draw.labels import overlap, words_of
 from camviz.draw.panel import Panel, image_panel
 from camviz.draw.picture import Picture, jpeg, png
+from camviz.draw.writing import PageWriter
 
 NAN = np.nan
 
 
 def test_a_line_is_interrupted_where_a_point_does_not_exist():
-    drawn = svg.line([(0, 0), (1, 0), (NAN, NAN), (3, 0), (4, 0)], "ink")
-    assert drawn.count("M") == 2
-    assert "nan" not in drawn
+    written = PageWriter().write(svg.line([(0, 0), (1, 0), (NAN, NAN), (3, 0), (4, 0)], "ink"))
+    assert written.count("M") == 2
+    assert "nan" not in written
 
 
 def test_a_lone_point_between_gaps_draws_no_line():
-    assert svg.line([(NAN, 0), (1, 1), (NAN, 0)], "ink") == ""
+    assert svg.line([(NAN, 0), (1, 1), (NAN, 0)], "ink") == svg.NOTHING
 
 
 def test_an_outline_with_a_missing_corner_is_not_filled():
-    assert svg.polygon([(0, 0), (1, 0), (NAN, 1)], "blue") == ""
+    assert svg.polygon([(0, 0), (1, 0), (NAN, 1)], "blue") == svg.NOTHING
 
 
 def test_words_from_a_file_cannot_become_markup():
-    root = ElementTree.fromstring(svg.text((0, 0), "<script>&"))
+    root = ElementTree.fromstring(PageWriter().write(svg.text((0, 0), "<script>&")))
     assert root.text == "<script>&"
     assert len(root) == 0
 
 
 def test_a_mark_without_a_place_is_left_out():
-    assert svg.dots([(1, 2), (NAN, 3)], "blue").count("M") == 1
-    assert svg.text((NAN, 0), "nowhere") == ""
+    (dots,) = svg.dots([(1, 2), (NAN, 3)], "blue")
+    assert dots.points.tolist() == [[1, 2]]
+    assert svg.text((NAN, 0), "nowhere") == svg.NOTHING
 
 
 def test_panel_coordinates_return_to_data():
@@ -69,7 +71,7 @@ def test_ticks_are_round_and_inside(low, high):
 @pytest.mark.parametrize("height", [40, 85, 300])
 def test_an_axis_names_two_values_at_least(limits, height):
     panel = plot.plot_panel("low", 70, 0, 300, height, (0, 1), limits)
-    assert plot.axes(panel, "", "", xticks=[]).count("tick end") >= 2
+    assert len(plot.axes(panel, "", "", xticks=[]).of("tick end")) >= 2
 
 
 def picture() -> Picture:
@@ -113,7 +115,7 @@ def test_a_long_caption_has_room_where_its_letters_are_large():
         for tile in tiles:
             x, y, width, height = tile.cell
             for unit in (1.0, unit_on_a_telephone(tile)):
-                (words,) = words_of(tile.body, (x, y, x + width, y + height), unit)
+                (words,) = words_of(tile.marks, (x, y, x + width, y + height), unit)
                 assert y + 10 + 0.75 * (width - 20) < words.box[1] < words.box[3] < y + height
 
 

@@ -1,11 +1,10 @@
 """Marks on photographs lie where they say, and no part of a line lies outside its panel."""
 
-import re
-
 import cv2
 import numpy as np
 
 from camviz.cameras import Intrinsics
+from camviz.draw.marks import NOTHING
 from camviz.draw.panel import Panel, image_panel
 from camviz.views.marks import border_arrow, clipped, crop, on_photograph
 
@@ -25,12 +24,11 @@ def test_a_line_is_clipped_as_opencv_clips_it():
 
 def test_segments_and_longer_lines_are_drawn_in_the_same_places_and_none_at_all_as_nothing():
     corner = np.array([[10.0, 20], [30, 20], [30, 60]])
-    numbers = [re.findall(r"[\d.]+", re.search(r' d="([^"]*)"', drawn)[1]) for drawn in (
-        on_photograph([corner], "green"), on_photograph(np.stack([corner[:-1], corner[1:]], axis=1), "green")
-    )]  # fmt: skip
-    assert list(map(float, numbers[0])) == corner.ravel().tolist()
-    assert list(map(float, numbers[1])) == [10, 20, 30, 20, 30, 20, 30, 60]
-    assert on_photograph([], "green") == ""
+    edge, line = on_photograph([corner], "green")
+    assert [one.tolist() for one in (*edge.lines, *line.lines)] == [corner.tolist()] * 2
+    _, segments = on_photograph(np.stack([corner[:-1], corner[1:]], axis=1), "green")
+    assert segments.ends.tolist() == [corner[:2].tolist(), corner[1:].tolist()]
+    assert on_photograph([], "green") == NOTHING
 
 
 def test_a_line_inside_stays_whole_and_one_without_an_end_is_left_out():
@@ -54,4 +52,6 @@ def test_an_arrow_to_what_lies_outside_is_inside_however_flat_the_picture():
     for width, height in ((640, 480), (4096, 2), (1, 4096)):
         panel = image_panel("left", 0, 0, 455, width, height, tallest=342)
         for toward in np.array([(1, 0), (0, -1), (0.6, 0.8)]):
-            assert "nan" not in border_arrow(panel, toward, "there")
+            (arrow, words) = border_arrow(panel, toward, "there")
+            assert np.isfinite(arrow.lines[0]).all()
+            assert np.isfinite([words.x, words.y]).all()

@@ -12,6 +12,7 @@ import pytest
 from every_view import STATES, classes, figure
 
 from camviz.draw import svg
+from camviz.draw.marks import Marks
 from camviz.draw.picture import Picture, jpeg, png
 from camviz.views.distortion import DistortionView
 from camviz_school.views.pinhole import PinholeView
@@ -48,22 +49,20 @@ def test_light_and_dark_differ_in_their_colours_alone():
     assert re.sub(r"#[0-9a-f]{6}", "", light) == re.sub(r"#[0-9a-f]{6}", "", dark)
 
 
-def picture(body: str, **photographs: bytes) -> Picture:
+def picture(body: Marks, **photographs: bytes) -> Picture:
     return Picture.whole(body, 40, 40, "Title", "What it shows", photographs)
 
 
-def plain(body: str, **photographs: bytes) -> ElementTree.Element:
+def plain(body: Marks, **photographs: bytes) -> ElementTree.Element:
     return ElementTree.fromstring(picture(body, **photographs).portable())
 
 
 def test_the_stronger_rule_wins_and_an_elements_own_style_over_both():
     drawn = svg.polygon([(0, 0), (9, 0), (9, 9)], "wash fill-blue")
-    drawn += svg.line([(0, 0), (9, 9)], "blue thick") + svg.line(
-        [(0, 0), (9, 9)], "blue thick", style="stroke-width:7px"
-    )
+    drawn += svg.line([(0, 0), (9, 9)], "blue thick") + svg.line([(0, 0), (9, 9)], "blue thick", stroke_width=7)
     drawn += svg.polygon([(0, 0), (9, 0), (9, 9)], "wash blue")
     fill, thick, own, outlined = plain(drawn).iter(f"{SVG}path")
-    assert (fill.get("fill"), fill.get("fill-opacity"), fill.get("stroke")) == ("#0067a5", ".16", "none")
+    assert (fill.get("fill"), fill.get("fill-opacity"), fill.get("stroke")) == ("#0067a5", "0.16", "none")
     assert (thick.get("fill"), thick.get("stroke"), thick.get("stroke-width")) == ("none", "#0067a5", "2.8")
     assert own.get("stroke-width") == "7"
     assert outlined.get("stroke") == "#0067a5"  # `path.blue` names more than `.wash`, which comes later
@@ -87,15 +86,14 @@ def embedded(root: ElementTree.Element) -> np.ndarray:
 
 def test_a_mask_becomes_transparency():
     grey, mask = np.full((4, 4), 90, np.uint8), np.diag([255] * 4).astype(np.uint8)
-    masked = svg.element("mask", svg.image("m", 0, 0, 4, 4), id="one")
-    found = embedded(plain(masked + svg.image("p", 0, 0, 4, 4, mask="url(#one)"), p=jpeg(grey), m=png(mask)))
+    found = embedded(plain(svg.image("p", 0, 0, 4, 4, mask="m", mask_id="one"), p=jpeg(grey), m=png(mask)))
     np.testing.assert_array_equal(found[..., 3], mask)
     np.testing.assert_allclose(found[..., :3], 90, atol=2)
 
 
 def test_hard_pixels_are_given_as_many_that_smoothing_does_not_show():
     few = np.array([[0, 200], [50, 255]], np.uint8)
-    found = embedded(plain(svg.image("p", 0, 0, 40, 40, style="image-rendering:pixelated"), p=png(few)))
+    found = embedded(plain(svg.image("p", 0, 0, 40, 40, image_rendering="pixelated"), p=png(few)))
     assert found.shape == (160, 160)
     np.testing.assert_array_equal(found[::80, ::80], few)
 
@@ -136,9 +134,9 @@ def test_a_pdf_has_all_of_its_fonts_inside(tmp_path):
 def test_without_cairosvg_a_png_says_what_to_install_and_an_svg_is_saved(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "cairosvg", None)
     with pytest.raises(ModuleNotFoundError, match=r"pip install camviz\[figures\]") as refused:
-        picture("").save(tmp_path / "p.png")
+        picture(svg.NOTHING).save(tmp_path / "p.png")
     assert str(refused.value).count(".") == str(refused.value).rstrip(".").count(".") + 1
-    picture("").save(tmp_path / "p.svg")
+    picture(svg.NOTHING).save(tmp_path / "p.svg")
     assert not (tmp_path / "p.png").exists()
 
 
@@ -148,9 +146,9 @@ def test_without_cairosvg_a_png_says_what_to_install_and_an_svg_is_saved(tmp_pat
 ])  # fmt: skip
 def test_what_cannot_be_saved_is_refused_in_words(name, options, words, tmp_path):
     with pytest.raises(ValueError, match=words):
-        picture("").save(tmp_path / name, **options)
+        picture(svg.NOTHING).save(tmp_path / name, **options)
 
 
 def test_for_a_browser_the_picture_keeps_its_style_sheet(tmp_path):
-    picture("").save(tmp_path / "p.svg", theme="browser")
+    picture(svg.NOTHING).save(tmp_path / "p.svg", theme="browser")
     assert "prefers-color-scheme: dark" in (tmp_path / "p.svg").read_text()

@@ -1,6 +1,5 @@
 """Solid pictures agree with the camera, hide what is hidden, and never take the process down."""
 
-import re
 import signal
 import subprocess
 import sys
@@ -16,6 +15,7 @@ from camviz.draw.items import Dots, Face, Line, TexturedMesh
 from camviz.draw.opengl import opengl_works, why_not_solid
 from camviz.draw.space import OrbitCamera, chosen_renderer, draw_space, space_panel
 from camviz.draw.wire import Viewport
+from camviz.draw.writing import PageWriter
 
 EYE = OrbitCamera(target=(0, 0.2, 3), distance=6)
 PANEL = space_panel("space", 0, 0, 480, 360)
@@ -120,26 +120,28 @@ def test_scenery_that_is_no_opaque_sheet_is_drawn_too():
         SQUARE, np.array([[0, 1, 2, 3]]), SQUARE[:, :2], np.full((1, 1, 3), 200, np.uint8), opacity=0.5
     )
     as_scenery = draw_space(PANEL, [], eye, renderer="solid", scenery=(line, glass, Face(SQUARE + (0, 0, 1))))
-    assert as_scenery == draw_space(PANEL, [line, glass, Face(SQUARE + (0, 0, 1))], eye, renderer="solid")
-    assert 'class="line"' in as_scenery[0]
+    as_items = draw_space(PANEL, [line, glass, Face(SQUARE + (0, 0, 1))], eye, renderer="solid")
+    written = [(PageWriter().write(marks), attached) for marks, attached in (as_scenery, as_items)]
+    assert written[0] == written[1]
+    assert as_scenery[0].of("line")
 
 
 @needs_opengl
 def test_lines_behind_a_surface_are_faint_and_lines_before_it_are_not():
     eye = OrbitCamera((0, 0, 3), 6, 0, 0)
     lines = [Line([(-0.5, 0.1, z), (0.5, 0.1, z)], f"line{z}") for z in (2, 5)]
-    fragment, _ = draw_space(PANEL, [Face(SQUARE), *lines], eye, renderer="solid")
-    opacity = {z: float(re.search(rf'class="line{z}" style="[^"]*opacity:([\d.]+)', fragment)[1]) for z in (2, 5)}
+    marks, _ = draw_space(PANEL, [Face(SQUARE), *lines], eye, renderer="solid")
+    opacity = {z: marks.of(f"line{z}")[0].style["stroke_opacity"] for z in (2, 5)}
     assert opacity[5] < 0.2 < 0.5 < opacity[2]
-    assert "faint" in draw_space(PANEL, [Face(SQUARE), Dots((0, 0, 5))], eye, renderer="solid")[0]
+    assert draw_space(PANEL, [Face(SQUARE), Dots((0, 0, 5))], eye, renderer="solid")[0].of("faint")
 
 
 @needs_opengl
 def test_the_outline_of_a_surface_is_not_hidden_by_it():
     outline = Line(np.vstack([SQUARE, SQUARE[:1]]), "blue")
     for eye in (EYE, EYE.orbited(60, 50), EYE.orbited(-90, -30)):
-        fragment, _ = draw_space(PANEL, [Face(SQUARE), outline], eye, renderer="solid")
-        assert "opacity:0.16" not in fragment
+        marks, _ = draw_space(PANEL, [Face(SQUARE), outline], eye, renderer="solid")
+        assert min(mark.style["stroke_opacity"] for mark in marks.of("blue")) > 0.16
 
 
 @needs_opengl

@@ -1,6 +1,5 @@
 """Drawings in space show every point where the onlooker's camera has it."""
 
-import re
 import subprocess
 import sys
 from itertools import product
@@ -13,6 +12,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from camviz.cameras import Camera, Intrinsics, look_at
 from camviz.draw.items import Dots, Face, Label, Line, TexturedMesh, axes_triad, camera_body, grid_lines
 from camviz.draw.space import OrbitCamera, chosen_renderer, draw_space, scene_items, space_panel
+from camviz.draw.writing import PageWriter
 from camviz.lenses import BrownConrady, KannalaBrandt
 from camviz.scenes import textured_scene
 
@@ -30,12 +30,6 @@ def pixels(eye, points, width=480, height=360):
     R, t = camera.cam_from_world.rotation.as_matrix(), camera.cam_from_world.translation
     uv, _ = cv2.projectPoints(np.asarray(points, float), cv2.Rodrigues(R)[0], t, camera.intrinsics.K, None)
     return uv.reshape(-1, 2) + 0.5
-
-
-def path_points(fragment, class_):
-    """All points of the paths of one class, in order."""
-    data = "".join(re.findall(rf'<path d="([^"]*)" class="{class_}"', fragment))
-    return np.array(re.findall(r"(-?[\d.]+),(-?[\d.]+)", data), dtype=float)
 
 
 def test_the_eye_looks_at_its_target_from_its_distance():
@@ -91,14 +85,14 @@ def test_an_eye_that_cannot_see_is_refused_by_name(field, value):
 
 def test_lines_end_where_opencv_projects_their_ends():
     points = np.array([(-1, 0.5, 2), (1, -0.5, 4), (0.3, 1, 3)])
-    drawn = path_points(wire([Line(points, "blue")])[0], "blue")
+    drawn = wire([Line(points, "blue")])[0].points("blue")
     for expected in pixels(EYE, points):
         assert np.linalg.norm(drawn - expected, axis=1).min() < 0.1
 
 
 def test_a_line_through_the_eye_is_cut_in_front_of_it():
     behind = EYE.camera(480, 360).world_from_cam.apply([(0.5, 0.2, -3), (0.5, 0.2, 8)])
-    drawn = path_points(wire([Line(behind, "blue")])[0], "blue")
+    drawn = wire([Line(behind, "blue")])[0].points("blue")
     assert len(drawn) >= 2
     expected = pixels(EYE, behind[1:])[0]
     assert np.linalg.norm(drawn - expected, axis=1).min() < 0.1
@@ -106,42 +100,42 @@ def test_a_line_through_the_eye_is_cut_in_front_of_it():
 
 
 def test_what_lies_outside_the_picture_costs_nothing():
-    assert path_points(wire([Line([(50, 0, 3), (50, 1, 3)], "blue")])[0], "blue").size == 0
+    assert wire([Line([(50, 0, 3), (50, 1, 3)], "blue")])[0].points("blue").size == 0
 
 
 def test_nan_interrupts_a_line():
     points = np.array([(-1, 0, 3), (0, 0, 3), (np.nan,) * 3, (0.5, 0, 3), (1, 0, 3)])
-    fragment, _ = wire([Line(points, "blue")])
-    drawn = path_points(fragment, "blue")
+    marks, _ = wire([Line(points, "blue")])
+    drawn = marks.points("blue")
     gap = pixels(EYE, [(0, 0, 3), (0.5, 0, 3)])[:, 0]
     assert not ((drawn[:, 0] > gap[0] + 0.1) & (drawn[:, 0] < gap[1] - 0.1)).any()
-    assert fragment.count("M") == 2
+    assert sum((~segments.continues).sum() for segments in marks) == 2
 
 
 def test_nearer_lines_are_stronger():
-    fragment, _ = wire([Line([(-1, 0, z), (1, 0, z)], f"line{z}") for z in (0, 9)], OrbitCamera((0, 0.2, 3), 6, 0, 10))
-    width = {z: float(re.search(rf'class="line{z}" style="stroke-width:([\d.]+)', fragment)[1]) for z in (0, 9)}
-    assert width[0] > width[9]
+    marks, _ = wire([Line([(-1, 0, z), (1, 0, z)], f"line{z}") for z in (0, 9)], OrbitCamera((0, 0.2, 3), 6, 0, 10))
+    width = {mark.class_: mark.style["stroke_width"] for mark in marks}
+    assert width["line0"] > width["line9"]
 
 
 def test_near_things_are_painted_over_far_ones():
     square = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
-    fragment, _ = wire([Face(square + (0, 0, z), colour) for z, colour in ((1, "red"), (5, "blue"), (3, "green"))])
-    assert fragment.index("fill-blue") < fragment.index("fill-green") < fragment.index("fill-red")
+    faces, _ = wire([Face(square + (0, 0, z), colour) for z, colour in ((1, "red"), (5, "blue"), (3, "green"))])
+    assert [mark.class_ for mark in faces] == ["fill-blue", "fill-green", "fill-red"]
     between, _ = wire([Line([(-1, 0, 4), (1, 0, 4)], "ink"), *(Face(square + (0, 0, z), "red") for z in (2, 6))])
-    assert re.findall('class="(fill-red|ink)"', between) == ["fill-red", "ink", "fill-red"]
+    assert [mark.class_ for mark in between] == ["fill-red", "ink", "fill-red"]
 
 
 def test_a_face_that_reaches_behind_the_eye_is_cut():
     floor = np.array([(-9, 1, -30), (9, 1, -30), (9, 1, 30), (-9, 1, 30)])
-    assert len(path_points(wire([Face(floor)])[0], "fill-blue")) == 4
+    assert len(wire([Face(floor)])[0].points("fill-blue")) == 4
 
 
 def test_dots_and_labels_stand_at_their_points():
-    fragment, _ = wire([Dots([(0.5, 0.5, 3)], "red"), Label((0.5, 0.5, 3), "here")])
-    u, v = pixels(EYE, [(0.5, 0.5, 3)])[0]
-    assert f"M{u:.1f},{v:.1f}h0" in fragment
-    assert re.search(rf'<text x="{u:.6g}" [^>]*>here<', fragment)
+    (dots, label), _ = wire([Dots([(0.5, 0.5, 3)], "red"), Label((0.5, 0.5, 3), "here")])
+    expected = pixels(EYE, [(0.5, 0.5, 3)])[0]
+    np.testing.assert_allclose(dots.points[0], expected, atol=1e-6)
+    assert (label.words, label.x) == ("here", pytest.approx(expected[0]))
 
 
 def test_a_picture_in_space_is_seen_in_exact_perspective():
@@ -149,9 +143,8 @@ def test_a_picture_in_space_is_seen_in_exact_perspective():
     colours = np.array([[(255, 0, 0), (0, 255, 0)], [(0, 0, 255), (255, 255, 0)]], np.uint8)
     picture = np.repeat(np.repeat(colours, 60, 0), 80, 1)
     corners = np.array([[(-1, -0.5, 2), (1, -0.5, 4)], [(-1, 1, 2), (1, 1, 4)]], float)
-    fragment, photographs = wire([TexturedMesh.over(corners, picture)])
-    box = re.search(r' x="(.*?)" y="(.*?)" width="(.*?)" height="(.*?)"', fragment)
-    x, y, width, height = map(float, box.groups())
+    (image,), photographs = wire([TexturedMesh.over(corners, picture)])
+    x, y, width, height = image.x, image.y, image.width, image.height
     seen = cv2.imdecode(np.frombuffer(photographs["space-0"], np.uint8), cv2.IMREAD_UNCHANGED)
     scale = seen.shape[1] / width
     assert seen.shape[0] / height == pytest.approx(scale)
@@ -231,8 +224,8 @@ def test_an_unknown_renderer_is_refused(monkeypatch):
 
 
 def test_the_standard_scene_as_wireframe_is_small():
-    fragment, photographs = wire(scene_items(textured_scene, "wire"))
-    assert 5_000 < len(fragment) < 40_000
+    marks, photographs = wire(scene_items(textured_scene, "wire"))
+    assert 5_000 < len(PageWriter().write(marks)) < 40_000
     assert not photographs
 
 

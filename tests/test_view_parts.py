@@ -1,12 +1,11 @@
 """What views share: numbers as text, rows beside a picture, bars that choose a view, the walk around a space."""
 
-import re
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
-from camviz.draw import plot
+from camviz.draw import plot, svg
 from camviz.draw.flow import rows
 from camviz.draw.panel import Panel
 from camviz.draw.readout import decimal, listed, readout, seconds, signed, vector
@@ -14,11 +13,9 @@ from camviz.draw.space import OrbitCamera, space_panel
 from camviz.views.base import OrbitView, View, answered, step_of, without
 from camviz.views.view_bars import ViewChooser, bars_of, ceiling, figures_on, names_below
 
-TEXT = re.compile(r'<text x="([-\d.]+)" y="([-\d.]+)" class="([^"]*)"[^>]*>([^<]*)</text>')
-
 
 def texts(drawn):
-    return [(float(x), float(y), class_, words) for x, y, class_, words in TEXT.findall(drawn)]
+    return [(text.x, text.y, text.class_, text.words) for text in drawn.texts()]
 
 
 @pytest.mark.parametrize(
@@ -72,9 +69,9 @@ def test_only_the_handle_of_the_space_walks_around_it():
 
 def test_a_space_is_a_handle_that_says_how_to_turn_it():
     drawn, attached = Walk().in_space(space_panel("space", 0, 0, 60, 40), [], False, "Nothing", "Walk around nothing")
-    assert 'data-drag="eye"' in drawn
-    assert "drag to turn" in drawn
-    assert 'aria-label="Walk around nothing"' in drawn
+    assert drawn.handles == ["eye"]
+    assert "drag to turn" in [text.words for text in drawn.texts()]
+    assert drawn.panels()["space"].attributes["aria_label"] == "Walk around nothing"
     assert not attached
 
 
@@ -114,8 +111,7 @@ def test_keys_go_from_bar_to_bar_and_stop_at_the_ends():
 def test_the_chosen_bar_alone_is_orange_and_a_missing_value_has_none():
     panel, values = Bars()._bars, np.array([1.0, np.nan, 2.0, 1.5])
     drawn = bars_of(panel, values, 2)
-    counts = {class_: path.count("M") for path, class_ in re.findall(r'<path d="([^"]*)" class="([^"]*)"', drawn)}
-    assert counts == {"fill-blue": 2, "fill-orange": 1}
+    assert {path.class_: len(path.lines) for path in drawn} == {"fill-blue": 2, "fill-orange": 1}
     assert [words for *_, words in texts(figures_on(panel, values))] == ["1.00", "2.00", "1.50"]
 
 
@@ -126,7 +122,7 @@ def test_a_bar_that_would_flatten_the_rest_is_cut_and_keeps_its_number():
     assert ceiling(np.array([0.1, 0.1, 0.9])) == pytest.approx(1.2 * 0.9)  # tall, and yet the others can be read
     panel = replace(Bars()._bars, top=ceiling(values))
     drawn = figures_on(panel, values)
-    assert re.findall(r'<path d="(M[^"]*)" class="paper-line cut"', drawn)[0].count("M") == 1
+    assert [len(path.lines) for path in drawn.of("paper-line cut")] == [1]
     (x, y, *_), *_ = [found for found in texts(drawn) if found[-1] == "44.00"]
     assert x == pytest.approx(panel.place((4, 0))[0], abs=0.1)
     assert 0 < y < panel.height / 2
@@ -150,7 +146,7 @@ def test_a_function_that_is_not_there_answers_nothing_and_says_so():
     values, words = answered(None, (1,), np.zeros((2, 3)))
     assert np.isnan(values).all()
     assert values.shape == (2, 3)
-    assert words in without(Panel("p", 0, 0, 900, 50, 0, 1, 0, 1), words, "Yours")
+    assert words in [text.words for text in without(Panel("p", 0, 0, 900, 50, 0, 1, 0, 1), words, "Yours").texts()]
     assert answered(lambda x: 2 * x, (np.ones(2),), np.zeros(2))[0].tolist() == [2, 2]
 
 
@@ -161,6 +157,8 @@ def test_plus_and_the_arrows_up_and_right_lead_onwards():
 
 
 def test_a_picture_of_tiles_stands_on_paper_of_their_size():
-    picture = View().tiled(rows((120, {"all": 960})), {"all": "<g/>", "none": ""}, {"a": b"b"}, "words")
-    assert picture.body.startswith('<rect x="0" y="0" width="960" height="120" class="paper"/><g/>')
+    line = svg.line([(0, 0), (9, 9)], "ink")
+    picture = View().tiled(rows((120, {"all": 960})), {"all": line, "none": svg.NOTHING}, {"a": b"b"}, "words")
+    paper, drawn = picture.marks
+    assert (paper.width, paper.height, paper.class_, drawn) == (960, 120, "paper", line[0])
     assert (picture.height, picture.description, picture.photographs) == (120, "words", {"a": b"b"})

@@ -168,6 +168,11 @@ class Marks(tuple[Mark, ...]):
         classed = (mark for mark in self.walk() if not isinstance(mark, Image | Inset))
         return [mark for mark in classed if wanted <= {*mark.class_.split()}]
 
+    def points(self, class_: str) -> Array:
+        """All points (n, 2) of lines, segments and dots that have all of these classes, in their panels' units."""
+        lines = [line for mark in self.of(class_) for line in _lines_of(mark)]
+        return np.concatenate([*lines, np.empty((0, 2))])
+
     @property
     def handles(self) -> list[str]:
         """What a pointer can drag, by name."""
@@ -176,6 +181,17 @@ class Marks(tuple[Mark, ...]):
 
 
 NOTHING = Marks()
+
+
+def _lines_of(mark: Mark) -> tuple[Array, ...]:
+    match mark:
+        case Path():
+            return mark.lines
+        case Segments():
+            return tuple(mark.ends)
+        case Dots():
+            return (mark.points,)
+    return ()
 
 
 def join(parts: Iterable[Iterable[Mark]]) -> Marks:

@@ -353,9 +353,9 @@ class EpipolarView(OrbitView, TwoCameras):
         toward = at - (panel.width / 2, panel.height / 2) if np.isfinite(uv).all() else _heading(camera, other)
         return border_arrow(panel, unit(toward), f"epipole {_far(uv, camera)}".rstrip())
 
-    def _other_camera(self, panel: Panel, camera: Camera, other: Camera) -> str:
+    def _other_camera(self, panel: Panel, camera: Camera, other: Camera) -> Marks:
         if not self.baseline or not camera.sees(other.centre):
-            return ""
+            return NOTHING
         depth = min(0.12, self.baseline / 4)
         return camera_outline(panel, camera, other, depth, "orange" if panel.name == "left" else "blue")
 

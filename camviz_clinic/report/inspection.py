@@ -97,7 +97,7 @@ def _see(inspection: Inspection, finding: Finding) -> str:
     return f"→ {', '.join(links)}"
 
 
-def _section(case: Case, entry: Entry, inspection: Inspection) -> tuple[str, str]:
+def _section(case: Case, entry: Entry, inspection: Inspection) -> tuple[Marks, str]:
     """One view's section, of each camera where it is of one; or "" and why there is none."""
     cameras = ("",) if entry.of_all else case.names[:MOST_CAMERAS]
     shown, why = "", ""

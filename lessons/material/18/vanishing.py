@@ -208,7 +208,7 @@ class VanishingView(View):
         dot = svg.dots([at], "paper-dot", 10) + svg.dots([at], colour, 7)
         return svg.handle(hand + dot, f"end{index}", words)
 
-    def _your_points(self) -> tuple[str, str]:
+    def _your_points(self) -> tuple[Marks, str]:
         """Rings where the reader's function says that the lines meet, and the line that says why there are none."""
         drawn, said = "", ""
         for name in "xz":
