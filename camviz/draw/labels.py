@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from camviz.draw.marks import Group, Inset, Marks, Text
+from camviz.draw.marks import Group, Inset, Mark, Marks, Text
 
 SMALLEST = 12  # CSS pixels, of any word at any size of the picture
 SIZES = {"title": 14.0, "note": 12.0, "tick": 12.0, "number": 12.5, "": 13.0}  # picture units, as in style.css
@@ -68,7 +68,7 @@ def uncluttered(marks: Marks, tile: Box, unit: float = 1.0) -> Marks:
 
 def _with_texts(marks: Marks, texts: Iterator[Text | None]) -> Marks:
     """The marks with their texts replaced, in order; without those that are None."""
-    kept = []
+    kept: list[Mark] = []
     for mark in marks:
         if isinstance(mark, Group | Inset):
             kept.append(replace(mark, marks=_with_texts(mark.marks, texts)))

@@ -164,13 +164,17 @@ def heat_panel(
     high: float,
     unit: str,
     marks: Marks = svg.NOTHING,
+    *,
+    awaited: bool = False,
     **heading: str,
 ) -> Marks:
     """The map attached under the panel's name, of so many pixels, hatched where it has none, and its key at the right.
 
-    The key is attached as "NAME key". `marks` are drawn over the map, `heading` is what `Panel.show` takes.
+    The key is attached as "NAME key". `marks` are drawn over the map, `heading` is what `Panel.show` takes. A map that
+    is `awaited` is greyed.
     """
-    content = _hatching(panel) + placed_image(panel, panel.name, width, height, image_rendering="pixelated")
+    shown = placed_image(panel, panel.name, width, height, image_rendering="pixelated")
+    content = _hatching(panel) + (svg.group(shown, "awaited") if awaited else shown)
     x = panel.x + panel.width + _GAP
     key = svg.image(f"{panel.name} key", x, panel.y, _BAR, panel.height)
     key += svg.rectangle(x, panel.y, _BAR, panel.height, "frame")

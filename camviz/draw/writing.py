@@ -77,7 +77,7 @@ class PageWriter:
         return element("text", _words(mark), x=mark.x, y=mark.y, **look, transform=_rotation(mark))
 
     def _image(self, mark: Image) -> str:
-        box = {"x": mark.x, "y": mark.y, "width": mark.width, "height": mark.height}
+        box: dict[str, Any] = {"x": mark.x, "y": mark.y, "width": mark.width, "height": mark.height}
         stretched = {**box, "preserveAspectRatio": "none"}
         look = self._look("image", "", mark.style)
         if not mark.mask:
@@ -130,7 +130,13 @@ class FileWriter(PageWriter):
         data = _masked(data, self._photographs[mark.mask]) if mark.mask else _enlarged(data, mark, hard)
         kind = "png" if data.startswith(b"\x89PNG") else "jpeg"
         link = {"xlink:href": f"data:image/{kind};base64,{b64encode(data).decode()}"}
-        box = {"x": mark.x, "y": mark.y, "width": mark.width, "height": mark.height, "preserveAspectRatio": "none"}
+        box: dict[str, Any] = {
+            "x": mark.x,
+            "y": mark.y,
+            "width": mark.width,
+            "height": mark.height,
+            "preserveAspectRatio": "none",
+        }
         return element("image", **box, **link, **self._look("image", "", mark.style))
 
     def _inset(self, mark: Inset) -> str:

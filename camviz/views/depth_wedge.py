@@ -37,7 +37,7 @@ def wedge_panel(
     wedge = svg.polygon(panel.place([(0, B), edge, (end, 0), (near, 0)]), "wash fill-orange") if worth else NOTHING
     sides = svg.path([panel.place([(0, B), tip]) for tip in ((near, 0), edge)], "orange thin") if worth else NOTHING
     named, words = (right, "blue halo end") if right / 2 > Z else (0, "blue halo")  # where the orange ray is not
-    error = _error(panel, f * B, right, B, (near, min(far, right)), notes[1]) if worth else ""
+    error = _error(panel, f * B, right, B, (near, min(far, right)), notes[1]) if worth else svg.NOTHING
     content = (
         plot.grid(panel)
         + wedge

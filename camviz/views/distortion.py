@@ -18,7 +18,7 @@ from contourpy import contour_generator
 from camviz import distortion
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import plot, svg
-from camviz.draw.flow import Cell, rows, shortened
+from camviz.draw.flow import Cell, Part, rows, shortened
 from camviz.draw.items import closed
 from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_in, placed_image
@@ -211,7 +211,7 @@ class DistortionView(OrbitView):
             _NUMBERS: self._numbers_column,
         }
         layout = self._layout()
-        parts, photographs = dict[str, str](), dict[str, bytes]()
+        parts, photographs = dict[str, Part](), dict[str, bytes]()
         for name in (*self._beside_the_numbers, *([_NUMBERS] if self._has(_NUMBERS) else [])):
             tile = _TILES[name]
             parts[tile], attached = draw[name](layout[tile], draft=draft)

@@ -148,7 +148,9 @@ class EpipolarView(OrbitView, TwoCameras):
             return NOTHING
         if panel.name == "left":
             pixels = panel.place(self._starred)
-            return "" if self.your_lines is None else svg.dots(pixels, "paper-dot", 8) + svg.dots(pixels, "orange", 6)
+            return (
+                NOTHING if self.your_lines is None else svg.dots(pixels, "paper-dot", 8) + svg.dots(pixels, "orange", 6)
+            )
         drawn = self._marks_of_F(panel) if self.yours is not None else NOTHING
         return drawn + (self._star(panel) if self.your_lines is not None else NOTHING)
 
@@ -302,10 +304,10 @@ class EpipolarView(OrbitView, TwoCameras):
         said = {"note": self.equation()} if equation else {"hint": f"drag to {action}"}
         return panel.show(content, title=f"The {panel.name} picture", drag=panel.name, label=label, **said)
 
-    def _pencil(self, panel: Panel, camera: Camera) -> str:
+    def _pencil(self, panel: Panel, camera: Camera) -> Marks:
         """Epipolar lines all around the baseline: the images of planes that meet in it."""
         if not self.baseline or not self._has("epipoles"):
-            return ""
+            return NOTHING
         if panel.name not in self.drawn:
             axes = self.left.extrinsics[0]
             along, first = self._plane_axes(axes[2] if abs(self._along @ axes[2]) < 0.9 else axes[0])
@@ -432,7 +434,7 @@ class EpipolarView(OrbitView, TwoCameras):
     # The numbers -----------------------------------------------------------------------------------------------------
 
     def _numbers_block(self) -> Marks:
-        x, y, rows = self._layout["numbers"][0] + 22, self._layout["numbers"][1] + 18, list[str]()
+        x, y, rows = self._layout["numbers"][0] + 22, self._layout["numbers"][1] + 18, list[Marks]()
         if self._has("F"):
             rows.append(svg.text((x, y), "F, of unit norm" if self.F is not None else "No F here", "title"))
             for i, row in enumerate(self.F if self.F is not None else ()):

@@ -15,7 +15,7 @@ import numpy as np
 
 from camviz.cameras import Camera, Intrinsics, transform
 from camviz.draw import svg
-from camviz.draw.flow import Cell, rows
+from camviz.draw.flow import Cell, Part, rows
 from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.matrix import matrix
 from camviz.draw.panel import Panel, image_panel, placed_image
@@ -200,7 +200,7 @@ class FrustumView(OrbitView):
 
     def figure(self, *, draft: bool = False) -> Picture:
         image, taken = garden.drafted(self.camera) if draft else garden.taken(self.camera, garden.FINE)
-        parts: dict[str, Marks] = {}
+        parts: dict[str, Part] = {}
         photographs = {"camera": taken}
         if self._has("world"):
             parts["world"], attached = self._world_panel(image, draft)
@@ -282,7 +282,7 @@ class FrustumView(OrbitView):
 
     def _axes(self, panel: Panel) -> Marks:
         """The world's axes where the camera sees them, each with its name at the last place in the picture."""
-        lines, names = "", ""
+        lines, names = NOTHING, NOTHING
         for name, axis, colour in zip("XYZ", np.eye(3), ("orange", "green", "blue"), strict=True):
             line = panel.place(self.camera.project(np.linspace(0, _REACH, 33)[:, None] * axis))
             lines += svg.path(clipped(panel, line), f"{colour} thick")
@@ -298,11 +298,11 @@ class FrustumView(OrbitView):
         uv = self._your_camera.project(board_corners())
         return svg.dots(panel.place(np.where(self.camera.intrinsics.contains(uv)[:, None], uv, np.nan)), "orange", 3.5)
 
-    def _numbers(self) -> dict[str, Marks]:
+    def _numbers(self) -> dict[str, Part]:
         """The tiles of numbers, by name."""
         n, from_sliders = self.numbers(), " ← x, y, z"
         corners = {name: (x + 10, y + 18) for name, (x, y, _, _) in self._layout.items()}
-        parts: dict[str, Marks] = {}
+        parts: dict[str, Part] = {}
         if self._has("numbers"):
             centre = "C = −Rᵀt [m]" if self._has("point") else "C [m]"
             (x, y), held = corners["position"], self.mode

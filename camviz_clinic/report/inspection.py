@@ -14,7 +14,6 @@ import numpy as np
 from camviz.cameras import transform
 from camviz.draw import svg
 from camviz.draw.items import Face, Item, Label, Line
-from camviz.draw.marks import Marks
 from camviz.draw.page import document
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
@@ -97,7 +96,7 @@ def _see(inspection: Inspection, finding: Finding) -> str:
     return f"→ {', '.join(links)}"
 
 
-def _section(case: Case, entry: Entry, inspection: Inspection) -> tuple[Marks, str]:
+def _section(case: Case, entry: Entry, inspection: Inspection) -> tuple[str, str]:
     """One view's section, of each camera where it is of one; or "" and why there is none."""
     cameras = ("",) if entry.of_all else case.names[:MOST_CAMERAS]
     shown, why = "", ""
@@ -141,7 +140,7 @@ def accused(inspection: Inspection, name: str) -> list[int]:
     return [view for finding in inspection.findings if (finding.camera or alone) == name for view in finding.pictures]
 
 
-def _linked(case: Case, name: str, headed: bool, named: Sequence[int]) -> Marks:
+def _linked(case: Case, name: str, headed: bool, named: Sequence[int]) -> str:
     """The bars of all views, and of those `named` and the worst their pictures and boards, linked by `data-choose`.
 
     The first of those named is chosen at first, or the worst.
@@ -176,7 +175,7 @@ def worst_views(seen: Observations, named: Sequence[int] = ()) -> list[int]:
     return sorted([i for i in ranked if i < len(seen) and seen.shown[i]][:MOST_VIEWS])
 
 
-def _view_figure(view: ResidualsView, name: str, i: int) -> Marks:
+def _view_figure(view: ResidualsView, name: str, i: int) -> str:
     """One view's picture with its residuals, those on the board, and its figures."""
     k = view.observations.camera.intrinsics
     panel = image_panel(f"picture {i + 1}", 10, 34, 450, k.width, k.height, tallest=400)

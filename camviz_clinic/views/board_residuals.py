@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from camviz.draw import svg
-from camviz.draw.flow import Sentences, rows
+from camviz.draw.flow import Part, Sentences, rows
 from camviz.draw.items import Item, Label, Line, TexturedMesh
 from camviz.draw.marks import Marks
 from camviz.draw.panel import Panel
@@ -148,7 +148,11 @@ class BoardResidualsView(OrbitView):
 
     def figure(self, *, draft: bool = False) -> Picture:
         space, sheets = self._bent(draft)
-        parts = {"mean residuals": self._means_panel(), "bend": space, "in words": Sentences(self._solved())}
+        parts: dict[str, Part] = {
+            "mean residuals": self._means_panel(),
+            "bend": space,
+            "in words": Sentences(self._solved()),
+        }
         return self.tiled(_LAYOUT, parts, sheets)
 
     def _means_panel(self) -> Marks:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camviz.draw import plot, svg
-from camviz.draw.flow import Sentences, rows
+from camviz.draw.flow import Part, Sentences, rows
 from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_panel
 from camviz.draw.picture import Picture, png
@@ -90,7 +90,7 @@ class CoverageView(ObservedView):
             f"{100 * n['reach']:.0f} % of the way out."
         )
         held = self._radius() + self._tilt()
-        parts = {"coverage": heat, "how far out and how held": held, "in words": Sentences(words)}
+        parts: dict[str, Part] = {"coverage": heat, "how far out and how held": held, "in words": Sentences(words)}
         return self.tiled(_LAYOUT, parts, attached)
 
     def _map(self) -> Drawn:

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from camviz.draw import plot
-from camviz.draw.flow import Sentences, rows
+from camviz.draw.flow import Part, Sentences, rows
 from camviz.draw.marks import Marks
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
@@ -121,7 +121,11 @@ class CrossValidationView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         shown, attached = self._map()
-        parts = {"two halves": shown, "every view": self._views(), "in words": Sentences("\n".join(self.sentences()))}
+        parts: dict[str, Part] = {
+            "two halves": shown,
+            "every view": self._views(),
+            "in words": Sentences("\n".join(self.sentences())),
+        }
         return self.tiled(_LAYOUT, parts, attached)
 
     @cached_property

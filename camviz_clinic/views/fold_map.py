@@ -13,7 +13,7 @@ from contourpy import contour_generator
 from camviz import distortion
 from camviz.cameras import Camera
 from camviz.draw import plot, svg
-from camviz.draw.flow import Sentences, rows
+from camviz.draw.flow import Part, Sentences, rows
 from camviz.draw.items import closed
 from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_panel
@@ -83,7 +83,11 @@ class FoldView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         shown, attached = self._map((24, 18) if draft else (80, 60))
         curves = DistortionView.of(self.camera).curve_panel(570, 34, 370, 170, equation=False) + self._denominator()
-        parts = {"resolution": shown, "curves": curves, "in words": Sentences("\n".join(self.sentences()))}
+        parts: dict[str, Part] = {
+            "resolution": shown,
+            "curves": curves,
+            "in words": Sentences("\n".join(self.sentences())),
+        }
         return self.tiled(_LAYOUT, parts, attached)
 
     def resolution(self, columns: int, rows: int) -> tuple[Array, Array]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from camviz.cameras import transform
 from camviz.draw import svg
-from camviz.draw.flow import Sentences, rows
+from camviz.draw.flow import Part, Sentences, rows
 from camviz.draw.items import Face, Item, Line, closed
 from camviz.draw.panel import image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
@@ -90,7 +90,7 @@ class GuidanceView(OrbitView):
         space, attached = self._space(draft)
         shown, pictures = self._imitate()
         words = Sentences("\n".join(self.sentences()))
-        parts = {"the board to imitate": space, "its picture": shown, "in words": words}
+        parts: dict[str, Part] = {"the board to imitate": space, "its picture": shown, "in words": words}
         return self.tiled(_LAYOUT, parts, attached | pictures)
 
     @cached_property
@@ -124,7 +124,7 @@ class GuidanceView(OrbitView):
         a, camera = self.adjustment, self.adjustment.cameras[self.camera].at(RigidTransform.identity())
         k, board = camera.intrinsics, a.board
         panel = image_panel("imitate", 495, 34, 450, k.width, k.height, tallest=340)
-        content, attached = "", {}
+        content, attached = svg.NOTHING, {}
         if self.backdrop is not None:
             content = placed_image(panel, "backdrop", k.width, k.height, class_="faint")
             attached = {"backdrop": jpeg(self.backdrop)}

@@ -171,7 +171,7 @@ def _dots(panel: Panel, x: np.ndarray, y: np.ndarray, class_: str) -> Marks:
     return svg.dots(panel.place(np.log10(np.stack([x, y], axis=-1))), class_, 5)
 
 
-def _shown(panel: Panel, marks: str, title: str, xlabel: str, ylabel: str) -> Marks:
+def _shown(panel: Panel, marks: Marks, title: str, xlabel: str, ylabel: str) -> Marks:
     ticks = plot.logarithmic(panel.left, panel.right), plot.logarithmic(panel.bottom, panel.top)
     return plot.plotted(panel, marks, xlabel, ylabel, *ticks, aside=58, title=title)
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from camviz.draw import svg
-from camviz.draw.flow import Sentences, rows
+from camviz.draw.flow import Part, Sentences, rows
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture, jpeg
 from camviz.views.base import Drawn, slider
@@ -53,7 +53,7 @@ class OutliersView(ObservedView):
         )
 
     def figure(self, *, draft: bool = False) -> Picture:
-        parts, attached = dict[str, str](), dict[str, bytes]()
+        parts, attached = dict[str, Part](), dict[str, bytes]()
         images: dict[int, Any] = {}
         for i, (view, corner) in enumerate(self.worst):
             if view not in images:
@@ -77,7 +77,7 @@ class OutliersView(ObservedView):
         panel = Panel(
             f"corner {i + 1}", x, y, 138, 138, middle[0] - half, middle[0] + half, middle[1] - half, middle[1] + half
         )
-        content, crops = "", {}
+        content, crops = svg.NOTHING, {}
         if image is not None:
             crops = {f"corner{i}": jpeg(crop(image, seen.camera.intrinsics, middle, self.patch))}
             content = svg.image(f"corner{i}", 0, 0, 138, 138)

@@ -183,7 +183,7 @@ class EpipolarPairsView(ViewChooser):
         shared, i, k = self.shared, self.index, camera.intrinsics
         panel = image_panel(shared.names[side], 20 + 470 * side, 206, 450, k.width, k.height, tallest=350)
         image = shared.photographs[side](i)
-        content, attached = "", {}
+        content, attached = svg.NOTHING, {}
         if image is not None:
             name = f"pair{side}"
             content, attached = placed_image(panel, name, k.width, k.height), {name: jpeg(image)}
@@ -197,7 +197,7 @@ class EpipolarPairsView(ViewChooser):
             content += arrows(row[:1], row[-1:], "blue thick", 12) + svg.text(
                 row[0] + (-4, -10), "1", "blue halo middle"
             )
-        content += not_at_hand(panel) if image is None and shared.pictures else ""
+        content += not_at_hand(panel) if image is None and shared.pictures else svg.NOTHING
         return panel.show(content, title=f"{shared.names[side]}: arrows × {self.scale:g}"), attached
 
     def _lines(self, panel: Panel, side: int) -> Marks:

@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from camviz.draw import plot, svg
-from camviz.draw.flow import Sentences, rows
+from camviz.draw.flow import Part, Sentences, rows
 from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import image_panel
 from camviz.draw.picture import Picture
@@ -115,7 +115,7 @@ class RadiusView(ObservedView):
             "Noise scatters around zero. A ring's mean off zero by more than its pale bars says that the model "
             "is too simple there, or the board not flat."
         )
-        parts = {"picture": self._picture(), "rings": plots, "in words": Sentences(advice)}
+        parts: dict[str, Part] = {"picture": self._picture(), "rings": plots, "in words": Sentences(advice)}
         return self.tiled(_LAYOUT, parts)
 
     def _plot(self, name: str, title: str, part: int, y: float, height: float) -> Marks:

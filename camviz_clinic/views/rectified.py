@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from camviz import twoview
 from camviz.cameras import Camera
 from camviz.draw import svg
-from camviz.draw.flow import Sentences, rows
+from camviz.draw.flow import Part, Sentences, rows
 from camviz.draw.marks import Marks
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
@@ -120,7 +120,7 @@ class RectifiedView(ViewChooser):
         return " ".join(self.sentences())
 
     def figure(self, *, draft: bool = False) -> Picture:
-        parts, attached, bottom = dict[str, str](), {}, 34.0
+        parts, attached, bottom = dict[str, Part](), {}, 34.0
         for side, camera in enumerate((self.left, self.right)):
             turned = camera if isinstance(self.pair, str) else (self.pair.left, self.pair.right)[side]
             k = turned.intrinsics

@@ -170,7 +170,7 @@ class ResidualsView(ViewChooser, OrbitView):
         image = seen.photographs(i)
         content, attached, missing = self._grid(panel), {}, not_at_hand(panel) if seen.pictures else NOTHING
         if image is not None:
-            content, missing = placed_image(panel, "photograph", k.width, k.height), ""
+            content, missing = placed_image(panel, "photograph", k.width, k.height), svg.NOTHING
             attached = {"photograph": jpeg(image)}
         starts, ends = panel.place(seen.detections[i]), panel.place(self.arrow_tips())
         content += arrows(starts[seen.used[i]], ends[seen.used[i]], "orange")
@@ -237,7 +237,7 @@ class ResidualsView(ViewChooser, OrbitView):
         )
 
 
-def _set_aside(starts: Array, ends: Array, size: float = 5) -> tuple[str, bool]:
+def _set_aside(starts: Array, ends: Array, size: float = 5) -> tuple[Marks, bool]:
     """Crosses and arrows (n, 2) of corners that were set aside, whose errors know no bounds, and whether any is cut."""
     ends, cut = shortened(starts, ends, _LONGEST)
     return arrows(starts, ends, "red dotted") + cross(starts, "red", size), bool(cut.any())

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from camviz import distortion
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
-from camviz.draw.flow import Sentences, rows
+from camviz.draw.flow import Part, Sentences, rows
 from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
@@ -90,7 +90,11 @@ class UndistortedView(View):
             )
         both = {"as taken": 480.0, "undistorted": 480.0}
         layout = rows((max(before.height, after.height) + 44, both), (38, {"in words": 960}))
-        parts = {"as taken": shown, "undistorted": straightened, "in words": Sentences(self.description())}
+        parts: dict[str, Part] = {
+            "as taken": shown,
+            "undistorted": straightened,
+            "in words": Sentences(self.description()),
+        }
         return self.tiled(layout, parts, attached)
 
     def _taken(self, small: Camera) -> NDArray[np.uint8]:
@@ -99,7 +103,7 @@ class UndistortedView(View):
         return cv2.resize(self.image, (small.intrinsics.width, small.intrinsics.height), interpolation=cv2.INTER_AREA)
 
     def _straight(self, panel: Panel) -> Marks:
-        return on_photograph(panel.place(_grid(self.camera.intrinsics)), "sky thin") if self.lines else ""
+        return on_photograph(panel.place(_grid(self.camera.intrinsics)), "sky thin") if self.lines else NOTHING
 
     def _bent(self, panel: Panel, found: tuple[Intrinsics, tuple[int, int, int, int]] | str) -> Marks:
         """The grid of the undistorted picture where it lies in the photograph."""

@@ -16,7 +16,7 @@ import numpy as np
 from camviz import optics
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
-from camviz.draw.flow import Cell, rows
+from camviz.draw.flow import Cell, Part, rows
 from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
@@ -170,7 +170,7 @@ class PinholeView(OrbitView):
 
     def figure(self, *, draft: bool = False) -> Picture:
         upright = self.image(320 if draft else PIXELS)
-        parts, photographs = dict[str, str](), dict[str, bytes]()
+        parts, photographs = dict[str, Part](), dict[str, bytes]()
         layout = self._layout
         for name in self._drawn:
             if name == "box":
@@ -222,10 +222,10 @@ class PinholeView(OrbitView):
             outlines = svg.path(panel.place(lines), "yellow")
             return panel.show(picture + outlines, title="The picture, its outlines projected")
         title = "The picture, as a display shows it" if self._upright else "On the wall, from behind"
-        size = f"{WALL_MM[0]:g} × {WALL_MM[1]:g} mm" if self._has("numbers") else NOTHING
+        size = f"{WALL_MM[0]:g} × {WALL_MM[1]:g} mm" if self._has("numbers") else ""
         return panel.show(picture + self._marks(panel), title=title, note=size)
 
-    def _image_panel(self, name: str, cell: Cell) -> tuple[Panel, str]:
+    def _image_panel(self, name: str, cell: Cell) -> tuple[Panel, Marks]:
         """A panel of the picture in a tile, and the picture in it."""
         pixels = self.camera().intrinsics
         panel = image_in(cell, name, pixels.width, pixels.height)

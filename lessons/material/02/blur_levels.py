@@ -18,7 +18,7 @@ def levels(panel: Panel, curve: Array, allowed_mm: float | None, airy_mm: float 
 
     `curve` (n, 2) is in panel coordinates.
     """
-    drawn, taken = "", curve
+    drawn, taken = svg.NOTHING, curve
     for blur, name, look, first in (
         (allowed_mm, f"allowed: c = {1000 * (allowed_mm or 0):.0f} µm", ("green", "dashed"), 1),
         (airy_mm, "Airy disc", ("purple", "dashed thin"), 0),

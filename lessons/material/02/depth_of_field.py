@@ -303,7 +303,7 @@ class DepthOfFieldView(View):
         blur = np.maximum(self.blur_mm(depth), 1e-6)
         far_x = min(np.log10(far), panel.right)
         allowed, airy = self.circle_mm if self.bounds else None, self.airy_mm if self.diffraction else None
-        bounds = band(panel, np.log10(near), far_x, "fill-green") if self.bounds else ""
+        bounds = band(panel, np.log10(near), far_x, "fill-green") if self.bounds else svg.NOTHING
         here = panel.place(logs((self.distance_m, max(float(self.blur_mm(self.distance_m)), BLURS[0]))))
         xticks, yticks = logarithmic(*logs(DEPTHS)), micrometres()
         right = (
@@ -327,7 +327,7 @@ class DepthOfFieldView(View):
 
     def _your_part(self, panel: Panel, depth_m: np.ndarray) -> tuple[Marks, str]:
         """The reader's blur over distance, their limits and the names of both; and what is wrong with either."""
-        drawn, entries, problems = "", [], []
+        drawn, entries, problems = svg.NOTHING, [], []
         state = (self.focal_mm, self.f_number)
         if self.yours:
             blur, problem = tried(self.yours, (*state, 1000 * self.focus_m, 1000 * depth_m), depth_m)
@@ -342,7 +342,7 @@ class DepthOfFieldView(View):
             entries += [] if problem else [("orange", "your limits")]
             problems.append(problem)
         words = "\n".join(filter(None, dict.fromkeys(problems)))
-        drawn += legend(panel, entries, "top right") if entries else ""
+        drawn += legend(panel, entries, "top right") if entries else svg.NOTHING
         below = 40 * len(entries)  # the legend, where it is shown largest
         drawn += svg.paragraph((12, 22 + below), words, panel.width - 24, "note halo") if words else NOTHING
         return drawn, words if all(is_unwritten(one) for one in problems) else ""

@@ -214,7 +214,7 @@ class IntrinsicsView(CameraMatrix):
             return NOTHING
         hidden = self.in_sight() < 0.5
         top = outline[np.argmin(outline[:, 1])] - (0, 11)
-        ring = svg.line(outline, "white", stroke="#fff", stroke_width=4.5) if hidden else ""
+        ring = svg.line(outline, "white", stroke="#fff", stroke_width=4.5) if hidden else svg.NOTHING
         words = "a balloon, behind the wall" if hidden else "the balloon"
         return ring + svg.line(outline, f"red thick{' dotted' if hidden else ''}") + _tag(top, words, "middle")
 
@@ -267,7 +267,7 @@ class IntrinsicsView(CameraMatrix):
             items += [Line(_ray(whole, corner, 1.4), "muted dashed", 1.0) for corner in self.taken.border(1)]
         return items
 
-    def _your_rays(self) -> tuple[list[Item], str, str]:
+    def _your_rays(self) -> tuple[list[Item], Marks, str]:
         """The rays of the picture's corners and border by the reader's function, as long as right ones to one depth,
         which are blue; words over them; and what is wrong with it. An unwritten one has right rays to wait for it.
         """
@@ -380,8 +380,10 @@ class IntrinsicsView(CameraMatrix):
 
 def _tag(at: Any, words: str, anchor: str = "") -> Marks:
     """Words on a photograph: white with a dark edge, whatever the theme."""
-    edge = {"fill": "#fff", "stroke": "#10151c", "stroke_width": 4, "stroke_linejoin": "round", "paint_order": "stroke"}
-    return svg.text(at, words, f"label {anchor}", **edge)
+    return svg.text(
+        at, words, f"label {anchor}", fill="#fff", stroke="#10151c", stroke_width=4, stroke_linejoin="round",
+        paint_order="stroke",
+    )  # fmt: skip
 
 
 def _ray(camera: Camera, uv: Array, length: float) -> Array:

@@ -108,7 +108,7 @@ class RotationView(OrbitView):
         x, y, across, high = layout["rings"]
         panel = space_panel("rings", x + 10, y + 34, across - 20, high - 44)
         label = "The rings in space; drag or press the arrow keys to walk around them, plus and minus to go nearer"
-        over = svg.text((14, 24), "gimbal lock: one line for both", "label halo red") if self.locked else ""
+        over = svg.text((14, 24), "gimbal lock: one line for both", "label halo red") if self.locked else svg.NOTHING
         space, attached = self.in_space(panel, self._items(), draft, "Three rings hold a camera", label, over=over)
         beside = {"numbers": self._numbers_panel()} if self._has("numbers") else {}
         return self.tiled(layout, {"rings": space} | beside, attached)
@@ -138,7 +138,7 @@ class RotationView(OrbitView):
             ("", _row(n["R"][1])),
             ("", _row(n["R"][2])),
         ]
-        y, words = 54.0, ""
+        y, words = 54.0, svg.NOTHING
         for name, value in rows:
             words += svg.text((634, y), name, "note")
             y += 21 if name else 0

@@ -14,7 +14,7 @@ import numpy as np
 
 from camviz.cameras import Camera, transform
 from camviz.draw import svg
-from camviz.draw.flow import Cell, rows, shortened
+from camviz.draw.flow import Cell, Part, rows, shortened
 from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
@@ -146,7 +146,7 @@ class CalibrationView(OrbitView, EstimateNumbers):
         attached = {"photograph": jpeg(self.photographs[self.index])} if self.photographs else {}
         if self._shows_the_board:
             attached |= behind(self._true_camera)
-        layout, parts = self._layout, dict[str, str]()
+        layout, parts = self._layout, dict[str, Part]()
         for name in self._tiles:
             tile = _TILES[name]
             if name == "picture":
@@ -249,7 +249,7 @@ class CalibrationView(OrbitView, EstimateNumbers):
         residuals, found = self.residuals, self.corners
         starts, ends = panel.place(found), panel.place(found + self.magnified * residuals)
         others = np.arange(self.count) != self.index
-        faint = "" if self.photographs else svg.segments(starts[others], ends[others], "red thin half")
+        faint = svg.NOTHING if self.photographs else svg.segments(starts[others], ends[others], "red thin half")
         here = svg.dots(starts[self.index], "orange", 4) + svg.segments(starts[self.index], ends[self.index], "red")
         return faint + here
 

@@ -100,7 +100,7 @@ def _marks(panel: Panel, values: Array, colour: str, diameter: float) -> Marks:
     inside = (at[:, 1] > 0) & (at[:, 1] < panel.height)
     half = 0.3 * panel.width / (panel.right - panel.left) * np.array([1, 0]) * 0.6
     marks = svg.dots(at[inside], colour, diameter) if diameter else NOTHING
-    marks += "" if diameter else svg.segments(at[inside] - half, at[inside] + half, f"{colour} thick")
+    marks += svg.NOTHING if diameter else svg.segments(at[inside] - half, at[inside] + half, f"{colour} thick")
     for px, py in at[~inside]:
         edge, inward = (2, 9) if py < 0 else (panel.height - 2, -9)
         marks += svg.polygon([(px, edge), (px - 5, edge + inward), (px + 5, edge + inward)], f"fill-{colour}")

@@ -15,7 +15,7 @@ import numpy as np
 
 from camviz.cameras import Camera
 from camviz.draw import svg
-from camviz.draw.flow import Cell, rows
+from camviz.draw.flow import Cell, Part, rows
 from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
@@ -130,7 +130,7 @@ class RectificationView(TurningPair):
 
     def figure(self, *, draft: bool = False) -> Picture:
         shown = self._panels.split()
-        drawn, attached = dict[str, str](), dict[str, bytes]()
+        drawn, attached = dict[str, Part](), dict[str, bytes]()
         if self._has("left") or self._has("right"):
             attached |= zip(("left", "right"), _photographs(*self._key(draft)), strict=True)
             drawn = {name: self._picture_panel(name) for name in ("left", "right") if name in shown}
@@ -209,23 +209,23 @@ class RectificationView(TurningPair):
         title = "Depth" if self.show == "depth" else "True depth"
         return "depth", title, *stereo_pair.depth_limits(self.source), "m"
 
-    def _map(self, name: str, low: float, high: float, unit: str, **heading: str) -> Marks:
+    def _map(self, name: str, low: float, high: float, unit: str, awaited: bool = False, **heading: str) -> Marks:
         """The map that is attached by that name, where it is shown, and below it what the hatching means."""
         if not self._has(name):
             return NOTHING
         panel, size = self._image_panel(name), self.stage.left.intrinsics
         mark = ring(panel.place(self.uv_left), "red", 5) if {"left", "right"} & set(self._panels.split()) else NOTHING
         hatched = svg.text((panel.x, panel.y + panel.height + 18), "hatched: nothing found", "note")
-        return heat_panel(panel, size.width, size.height, low, high, unit, mark, **heading) + hatched
+        return heat_panel(panel, size.width, size.height, low, high, unit, mark, awaited=awaited, **heading) + hatched
 
-    def _heat_maps(self, draft: bool) -> tuple[dict[str, str], dict[str, bytes]]:
+    def _heat_maps(self, draft: bool) -> tuple[dict[str, Part], dict[str, bytes]]:
         """The maps that are shown, by name, and what is attached to them."""
         colours, title, low, high, unit = self._second
         note = "" if self.source.photographs is None or self.source.distances is not None else "truth unknown"
         if self.show == "depth":
             formula = "Z = fB / (d + doffs)" if abs(self.stage.doffs) > 0.05 else "Z = fB / d"
-            note = formula if self._has("disparity") else NOTHING
-        drawn = {
+            note = formula if self._has("disparity") else ""
+        drawn: dict[str, Part] = {
             "disparity": self._map("disparity", 0, self.disparities, "px", title="Disparity", note=self.method),
             "second": self._map("second", low, high, unit, title=title, note=note),
         }
@@ -238,16 +238,16 @@ class RectificationView(TurningPair):
         given = (found.astype(float), now.left.intrinsics.fx, now.pair.baseline, now.doffs)
         return answered(self.yours, given, found)
 
-    def _your_maps(self, draft: bool) -> tuple[dict[str, str], dict[str, bytes]]:
+    def _your_maps(self, draft: bool) -> tuple[dict[str, Part], dict[str, bytes]]:
         """The right depths, and beside them those of the reader's function: the right ones, greyed, until it is."""
         limits, right = stereo_pair.depth_limits(self.source), self.stage.depth(self.disparity_map(draft=draft))
         depth, problem = self.your_depth(draft=draft)
-        own = self._map("second", *limits, "m", title="With your function")
+        waits = is_unwritten(problem)
+        own = self._map("second", *limits, "m", awaited=waits, title="With your function")
         if own:
             panel = self._image_panel("second")
-            if is_unwritten(problem):
+            if waits:
                 depth, middle = right, (panel.x + panel.width / 2, panel.y + panel.height / 2)
-                own = own.replace("<image ", '<image class="awaited" ', 1)  # words that are greyed cannot be read
                 own += svg.text(middle, YOURS_HERE, "title halo middle")
             elif problem:
                 own += svg.paragraph((panel.x + 12, panel.y + 26), problem, panel.width - 24, "note halo")
@@ -256,7 +256,7 @@ class RectificationView(TurningPair):
                 own += svg.text(at, f"at the mark: {metres(self._at_mark(depth))}", "orange end")
         images = {"disparity": heat_map(_small(right), *limits, "depth")}
         images["second"] = heat_map(_small(depth), *limits, "depth")
-        drawn = {"disparity": self._map("disparity", *limits, "m", title="Depth"), "second": own}
+        drawn: dict[str, Part] = {"disparity": self._map("disparity", *limits, "m", title="Depth"), "second": own}
         return drawn, images | dict.fromkeys(("disparity key", "second key"), heat_key("depth"))
 
     def _wedge_panel(self) -> Marks:

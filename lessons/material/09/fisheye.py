@@ -298,10 +298,10 @@ class FisheyeView(OrbitView):
             "orthographic": (92, 0.72, ""),
         }
         x, y, side = places[name]
-        return svg.text(panel.place((x, y)), name, f"{_COLOURS[name]} halo {side}", **self._bold(name))
+        return svg.text(panel.place((x, y)), name, f"{_COLOURS[name]} halo {side}", font_weight=self._boldness(name))
 
-    def _bold(self, name: str) -> dict[str, int]:
-        return {"font_weight": 600} if name == self.projection else {}
+    def _boldness(self, name: str) -> int:
+        return 600 if name == self.projection else 400
 
     # The dome --------------------------------------------------------------------------------------------------------
 

@@ -163,7 +163,7 @@ def sphere(panel: Panel, xi: float, rim_deg: float, towards_deg: float) -> Marks
     turn = np.linspace(0, 2 * pi, 121)
     circle = np.stack([np.sin(turn), np.cos(turn)], axis=-1)
     flat = 1.5  # where the plane is drawn, below the centre
-    eye, drawn = np.array([0.0, -xi]), ""
+    eye, drawn = np.array([0.0, -xi]), svg.NOTHING
     for angle, class_ in [(a, "blue thin") for a in np.linspace(-rim_deg, rim_deg, 10)] + [(towards_deg, "orange")]:
         on = np.array([sin(radians(angle)), cos(radians(angle))])
         depth = on[1] + xi

@@ -145,7 +145,7 @@ class LightFieldView(RefocusedField):
         if self._has("slice"):
             marks = on_photograph([across], "yellow thin") + marks + self._row_handle(across[0])
         label = "The picture; click or press the arrow keys to focus on what is there"
-        heading = {"hint": "click: focus there", "drag": "focus", "label": label}
+        heading: dict[str, Any] = {"hint": "click: focus there", "drag": "focus", "label": label}
         if self.show == "slopes":
             attached["picture"] = heat_map(self.slopes, *self.limits, "depth")
             attached["picture key"] = heat_key("depth")

@@ -61,7 +61,9 @@ def _rays(steps: np.ndarray, slope: float, row: Array, chosen: int) -> Marks:
         hit = (_LENS_X + _FILM, _MIDDLE + slope * step * _PITCH)
         colour = "blue" if step < 0 else "orange" if step > 0 else "ink"
         class_ = f"{'purple thick' if j == chosen else colour + ' thin'}{'' if weight else ' faint'}"
-        onward = svg.line([hit, (_LENS_X + meeting, _MIDDLE)], f"{class_} dotted half") if meeting > _FILM else ""
+        onward = (
+            svg.line([hit, (_LENS_X + meeting, _MIDDLE)], f"{class_} dotted half") if meeting > _FILM else svg.NOTHING
+        )
         parts.append(
             (j == chosen, onward + svg.line([(start, _MIDDLE), lens, hit], class_) + svg.dots([hit], class_, 4))
         )

@@ -204,7 +204,7 @@ class DemosaicingView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         photographs: dict[str, bytes] = {}
-        draw: dict[str, Callable[[], str]] = {
+        draw: dict[str, Callable[[], Marks]] = {
             "picture": lambda: self._large_panel(photographs, draft),
             "yours": lambda: self._your_panel(photographs, draft),
             "loupe": lambda: self._loupe_panels(photographs),
@@ -246,7 +246,7 @@ class DemosaicingView(View):
         return self._panel.show(placed_image(self._panel, "picture", *self._size) + marks, title=title, **heading)
 
     def _map_of_errors(
-        self, panel: Panel, error: NDArray, photographs: dict[str, bytes], draft: bool, marks: str, **heading: Any
+        self, panel: Panel, error: NDArray, photographs: dict[str, bytes], draft: bool, marks: Marks, **heading: Any
     ) -> Marks:
         coarse = cv2.resize(error, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) if draft else error
         photographs |= {panel.name: heat_map(coarse, 0, _WORST, "error"), f"{panel.name} key": heat_key("error")}

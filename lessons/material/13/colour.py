@@ -240,7 +240,7 @@ class ColourView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         photographs: dict[str, bytes] = {}
         photograph = partial(self._photograph_panel, photographs, draft)
-        draw: dict[str, Callable[[], str]] = {
+        draw: dict[str, Callable[[], Marks]] = {
             "chart": self._chart, "your chart": self._your_chart, "steps": self._steps, "figures": self._figures,
             "light": self._light_panel, "surface": self._surface_panel, "sensor": self._sensor_panel,
             "photograph": partial(photograph, "photograph"), "your photograph": partial(photograph, "your photograph"),

@@ -48,8 +48,9 @@ def steps(cell: Cell, colours: Mapping[str, np.ndarray]) -> Marks:
         left, y, width = cell[0] + 10, cell[1] + 8 + 74 * at, 100 / len(rgb)
         parts.append(svg.text((left + 114, y + 18), name, "label"))
         for k, (fill, colour) in enumerate(zip(hexadecimal(rgb), rgb, strict=True)):
-            crisp = {"fill": fill, "shape_rendering": "crispEdges"}  # no seam between halves that are alike
-            parts.append(svg.rectangle(left + k * width, y, width, 66, "patch", **crisp))
+            place = (left + k * width, y, width, 66)
+            crisp = "crispEdges"  # no seam between halves that are alike
+            parts.append(svg.rectangle(*place, "patch", fill=fill, shape_rendering=crisp))
             words = " ".join(f"{value:.3f}" for value in colour).replace("-", "−")
             class_ = ("blue", "orange")[k] if len(rgb) > 1 else ""
             parts.append(svg.text((left + 114, y + 39 + 20 * k), words, f"number {class_}"))

@@ -157,7 +157,7 @@ class ImageSensorView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         width, photographs = SMALL if draft else LARGE, dict[str, bytes]()
-        draw: dict[str, Callable[[], str]] = {
+        draw: dict[str, Callable[[], Marks]] = {
             "photograph": lambda: self._photograph(width, photographs),
             "efficiency": self._spectra,
             "electrons": self._electrons,
@@ -232,7 +232,7 @@ class ImageSensorView(View):
 
     def _in_words(self, panel: Panel, bar: int) -> Marks:
         """The two counts in green light in their bars."""
-        electrons, words = self.your_e[0], ""
+        electrons, words = self.your_e[0], svg.NOTHING
         for i, (one, class_) in enumerate(((self.green_e, "tick"), (electrons, "orange"))):
             if np.isfinite(one):
                 below = panel.place((bar - 1 + i, np.log10(np.clip(min(one, self.full_well), 4, 1e6)))) + (0, 18)

@@ -155,7 +155,7 @@ class ReadoutView(View):
         if self._has("scene"):
             photographs["scene"] = jpeg(self.scene_now(*size))
         title = "The picture, as far as it is read" if self.time < 100 else "The picture"
-        draw: dict[str, Callable[[], str]] = {
+        draw: dict[str, Callable[[], Marks]] = {
             "scene": lambda: self._photo("scene", "The scene at this moment", size, "moves on"),
             "picture": lambda: self._photo("picture", title, size),
             "numbers": self._numbers,

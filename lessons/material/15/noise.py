@@ -213,7 +213,7 @@ class PhotonTransferView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         pixels = 1500 if draft else 3000
         dn = self.image(draft=draft) if self._has("picture") or self._has("histogram") else np.zeros((1, 1))
-        draw: dict[str, Callable[[], str]] = {
+        draw: dict[str, Callable[[], Marks]] = {
             "picture": self._picture_panel,
             "curve": lambda: self._transfer_panel(pixels),
             "key": self._legend,

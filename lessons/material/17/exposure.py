@@ -166,7 +166,7 @@ class ExposureView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         recorded = self.recorded(draft=draft)
         figures = self.numbers()
-        draw: dict[str, Callable[[float], str]] = {
+        draw: dict[str, Callable[[float], Marks]] = {
             "picture": self._picture_panel,
             "corner": self._corner_panel,
             "signal": lambda x: readout({name: figures[name] for name in _SIGNAL}, (x + 10, 48), (0, 42), (0, 18)),

@@ -211,7 +211,7 @@ class SharpnessView(View):
     def _your_points(self, panel: Panel) -> tuple[Marks, str]:
         """The reader's MTF as orange points, or the line that says why there are none."""
         if self.yours is None:
-            return "", ""
+            return svg.NOTHING, ""
         f = np.linspace(0, TOP_PER_MM, 53)
         values, problem = tried(self.yours, (f, self.f_number, 1e-6 * self.wavelength(), self.pitch_um / 1000), f)
         points = panel.place(np.stack([f, np.clip(values, -1, 2)], axis=-1))

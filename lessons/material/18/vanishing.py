@@ -169,12 +169,12 @@ class VanishingView(View):
         middle = both.mean(axis=1)
         far = np.where(np.isfinite(at), at, middle + 1e3 * (both[:, 1] - both[:, 0]))
         thin = marks.clipped(PAPER, PAPER.place(np.stack([middle, far], axis=1)))
-        thick = marks.on_photograph(PAPER.place(both), f"{colour} thick") if np.isfinite(both).all() else ""
+        thick = marks.on_photograph(PAPER.place(both), f"{colour} thick") if np.isfinite(both).all() else svg.NOTHING
         return svg.segments(thin[:, 0], thin[:, 1], f"{colour} thin") + thick + svg.dots([PAPER.place(at)], colour, 12)
 
-    def _beyond(self) -> tuple[str, bool]:
+    def _beyond(self) -> tuple[Marks, bool]:
         """At the paper's border, on which side a point lies beyond it, and whether the words are on the left alone."""
-        drawn, lefts = "", []
+        drawn, lefts = svg.NOTHING, []
         for name in "xz":
             at, both = self.pixels[name], self.lines[name]
             if PAPER.left < at[0] < PAPER.right or np.isnan(both).any():
@@ -210,13 +210,13 @@ class VanishingView(View):
 
     def _your_points(self) -> tuple[Marks, str]:
         """Rings where the reader's function says that the lines meet, and the line that says why there are none."""
-        drawn, said = "", ""
+        drawn, said = svg.NOTHING, ""
         for name in "xz":
             if not self.yours:
                 continue
             answer, problem = tried(self.yours, tuple(self.lines[name].reshape(4, 2)), self.pixels[name])
             at, said = PAPER.place(answer), said or problem
-            drawn += marks.ring(at, "orange thick", 10) if (np.abs(at) < 2000).all() else ""
+            drawn += marks.ring(at, "orange thick", 10) if (np.abs(at) < 2000).all() else svg.NOTHING
         return drawn, said
 
     def _above_panel(self, cell: Cell) -> Marks:

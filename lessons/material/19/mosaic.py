@@ -204,7 +204,7 @@ class MosaicView(View):
         uv, to = self.matches
         ends = np.stack([panel.place(to), panel.place(warped(self.shown_H[0], uv))], axis=1)
         far = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1) > 1.5
-        off = on_photograph(ends[far], "red") if far.any() else ""
+        off = on_photograph(ends[far], "red") if far.any() else svg.NOTHING
         kept = ends[self.used, 0]
         return off + svg.dots(ends[:, 0], "paper-dot", 7) + svg.dots(ends[:, 0], "red", 5) + svg.dots(kept, "green", 5)
 
