@@ -604,4 +604,4 @@ def from_the_right(K, x0, y0, n):
     return K @ crop @ bins
 
 
-EXERCISES = (RAY, FIELD_OF_VIEW, RESIZED, CROPPED_THEN_BINNED)
+EXERCISES = (RAY, RESIZED, FIELD_OF_VIEW, CROPPED_THEN_BINNED)
