@@ -159,7 +159,7 @@ def test_in_which_form_files_give_rotations(says):
     chain = yaml.safe_load((DATA / "kalibr_chain.yaml").read_text(encoding="utf-8"))
     assert np.shape(chain["cam1"]["T_cn_cnm1"]) == (rows.value, columns.value)
     lines = (DATA / "colmap" / "images.txt").read_text(encoding="utf-8").splitlines()
-    number, *pose = next(line for line in lines if not line.startswith("#")).split()
+    _, *pose = next(line for line in lines if not line.startswith("#")).split()
     assert np.linalg.norm(np.array(pose[:4], dtype=float)) == pytest.approx(1, abs=1e-6)  # and three of t follow
 
 

@@ -295,8 +295,10 @@ def equations(points, centre, R):
 
 
 def test_eight_pairs_must_be_in_general_position(says):
-    says("Their scale is free, so eight pairs in general position are enough.")
-    says("Seven on one plane and one beside it are not. Nor are points on a ruled quadric that holds both camera")
+    says("so eight pairs in general position are enough, but not seven on one plane and one beside.")
+    says(
+        "Seven on one plane and one beside it do not, nor any number on a ruled quadric that holds the centres of both cameras."
+    )
     rng, R = np.random.default_rng(1), Rotation.from_rotvec([0.05, -0.2, 0.1]).as_matrix()
     points, centre = rng.uniform([-2, -1, 3], [2, 1, 8], (8, 3)), np.array([0.7, 0.1, -0.1])
     assert equations(points, centre, R) == 8
@@ -839,7 +841,9 @@ def test_before_the_lesson_a_camera_that_pans(says):
     for _ in range(50):
         left = rng.uniform([0, 0], [640, 480], (400, 2))
         right = cv2.perspectiveTransform(left[None], K @ R @ np.linalg.inv(K))[0]
-        left, right = (one[right[:, 0] < 640] + rng.normal(0, 0.5, (400, 2))[right[:, 0] < 640] for one in (left, right))
+        left, right = (
+            one[right[:, 0] < 640] + rng.normal(0, 0.5, (400, 2))[right[:, 0] < 640] for one in (left, right)
+        )
         F = cv2.findFundamentalMat(left, right, cv2.FM_8POINT)[0]
         *turns, t = cv2.decomposeEssentialMat(K.T @ F @ K)
         off.append(min(np.degrees(Rotation.from_matrix(turn @ R.T).magnitude()) for turn in turns))

@@ -205,15 +205,14 @@ def test_the_published_lens(says):
     theta = np.arctan2(np.hypot(*point[:2]), point[2])
     np.testing.assert_allclose(F * g(theta) * point[:2] / np.hypot(*point[:2]) + C, by_opencv(point), atol=1e-9)
     off, pixels, to = says(
-        "The lens of section 2 keeps to the equidistant one within 2.1 px of 1024 up to 78° from the axis, where the "
-        "picture's sides are."
+        "The lens of section 2 keeps to the equidistant one within 2.1 px of 1024 up to 78° from the axis."
     )
     assert to == np.degrees(max(sides))
     theta = np.linspace(0, max(sides), 1000)
     assert off == (F[0] * np.abs(g(theta) - theta)).max()
     assert off.value > (F[0] * np.abs(g(theta) - theta)).max()  # within: not rounded down
     assert pixels == width.value
-    *beyond, at_fold = says("Beyond, it leaves it: by 7 px at 90°, 25 px at 100° and 78 px at its fold.")
+    *beyond, at_fold = says("It is off by 7 px at 90°, 25 px at 100° and 78 px at its fold.")
     for missed, degrees in zip(beyond[::2], beyond[1::2], strict=True):
         angle = np.radians(degrees.value)
         assert missed == F[0] * (angle - g(angle))

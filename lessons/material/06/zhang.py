@@ -166,7 +166,7 @@ def _null_vector(V: Array) -> Array:
     _, s, Vt = np.linalg.svd(np.vstack([V / size, np.zeros(len(size))]), full_matrices=False)
     if not s[-2] > _UNDECIDED * s[0]:
         raise ValueError(
-            "these boards determine no camera matrix: they are parallel, mirror each other, or tilt about one row or column"
+            "these boards determine no camera matrix: they are parallel, mirrored, or tilt about one row or column"
         )
     return Vt[-1] / size
 
