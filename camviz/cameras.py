@@ -98,7 +98,7 @@ class Intrinsics:
         """Square pixels and a centred principal point, from what a data sheet says.
 
         Args:
-            focal_mm: Focal length in millimetres.
+            focal_mm: From lens to sensor in millimetres: the focal length of a lens that is focused at infinity.
             pitch_um: Distance of neighbouring pixels in micrometres.
 
         Raises: ValueError for a pitch or a focal length that is not positive.

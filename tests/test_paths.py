@@ -36,6 +36,16 @@ def test_the_course_is_every_lesson_but_the_first_page_and_the_electives():
     assert PATHS["The course"].minutes == sum(one.minutes for one in LESSONS if "01" <= one.number <= "16")
 
 
+def test_the_course_names_the_hours_of_its_deeper_sections():
+    course, stated = PATHS["The course"], 0
+    for lesson in course.lessons:
+        deeper = (ROOT / "lessons" / lesson.file).read_text(encoding="utf-8").split("## Going deeper")[1]
+        stated += sum(map(int, re.findall(r'"\*About (\d+) minutes', deeper)))
+    assert course.deeper_minutes == pytest.approx(stated, rel=0.02)
+    assert f"cores {course.minutes / 60:.0f} hours, deeper sections {stated / 60:.0f} hours |" in paths.table(LESSONS)
+    assert PATHS["An afternoon"].deeper_minutes == 0
+
+
 @pytest.mark.parametrize(("page", "folder"), [("README.md", ""), ("lessons/00_start_here.ipynb", "lessons")])
 def test_the_links_of_the_first_pages_lead_to_lessons(page, folder):
     text = (ROOT / page).read_text(encoding="utf-8")

@@ -25,17 +25,18 @@ WHOLE, BEGIN, LOOK = "", "begin", "look"
 MANY = 9
 """Stops beyond which a row names the first and the last alone: these lessons follow one another."""
 
-_SAID = {WHOLE: "", BEGIN: "to the first exercise", LOOK: "its first section"}
+_SAID = {WHOLE: "", BEGIN: "to the first exercise", LOOK: "its first section, up to the exercise"}
 _STOP = re.compile(r"(\d\d)(?: (begin|look))?")
 
 
 @dataclass(frozen=True)
 class Stop:
-    """A lesson on a path, and how much of it: WHOLE, BEGIN or LOOK."""
+    """A lesson on a path, and how much of it: WHOLE, BEGIN or LOOK. Deeper minutes are those below a whole core."""
 
     lesson: Lesson
     part: str
     minutes: float
+    deeper_minutes: float
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,11 @@ class LearningPath:
     def minutes(self) -> int:
         return minutes.said(sum(one.minutes for one in self.stops))
 
+    @property
+    def deeper_minutes(self) -> int:
+        """Of the deeper sections of those lessons whose core is read."""
+        return minutes.said(sum(one.deeper_minutes for one in self.stops))
+
 
 def paths(lessons: Iterable[Lesson]) -> list[LearningPath]:
     """The paths of the course. Raises ValueError naming what is wrong in paths.toml."""
@@ -68,13 +74,11 @@ def _stop(written: str, lessons: dict[str, Lesson], where: str) -> Stop:
     if not found or found[1] not in lessons:
         raise ValueError(f'{where}: a stop is a lesson, such as "05", "05 begin" or "05 look", got {written!r}')
     lesson, part = lessons[found[1]], found[2] or WHOLE
-    return Stop(lesson, part, _minutes(lesson, part))
-
-
-def _minutes(lesson: Lesson, part: str) -> float:
+    notebook = read(lessons_folder() / lesson.file)
     if part == WHOLE:
-        return lesson.minutes
-    return minutes.reckoned(part_of(minutes.core(read(lessons_folder() / lesson.file)), part))
+        deeper = sum(minutes.reckoned(section.cells) for section in minutes.sections(notebook))
+        return Stop(lesson, part, lesson.minutes, deeper)
+    return Stop(lesson, part, minutes.reckoned(part_of(minutes.core(notebook), part)), 0)
 
 
 def part_of(core: list[Cell], part: str) -> list[Cell]:
@@ -93,7 +97,7 @@ def part_of(core: list[Cell], part: str) -> list[Cell]:
 
 def table(lessons: Iterable[Lesson], folder: str = "", suffix: str = ".ipynb") -> str:
     """The table of paths. A link leads to `folder`, the notebook's name and `suffix`."""
-    rows = [f"| {one.title} | {_links(one, folder, suffix)} | {_long(one.minutes)} |" for one in paths(list(lessons))]
+    rows = [f"| {one.title} | {_links(one, folder, suffix)} | {_time(one)} |" for one in paths(list(lessons))]
     return "\n".join(["| You have, or are | Read | Time |", "|---|---|---|", *rows])
 
 
@@ -103,6 +107,11 @@ def _links(path: LearningPath, folder: str, suffix: str) -> str:
     said = _SAID[parts.pop()] if len(parts) == 1 else ""
     listed = f"{links[0]} to {links[-1]}" if len(links) > MANY else ", ".join(links)
     return f"{listed}: of each {said}" if said else listed
+
+
+def _time(path: LearningPath) -> str:
+    deeper = path.deeper_minutes
+    return f"cores {_long(path.minutes)}, deeper sections {_long(deeper)}" if deeper else _long(path.minutes)
 
 
 def _long(needed: int) -> str:

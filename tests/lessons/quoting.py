@@ -49,7 +49,7 @@ NOT_STATED = (
      r"|illuminant|Apache|CC BY|BY) ?[A-Z]{0,3}-?\d[\d.:-]*", "a proper name"),
     (r"(?:(?<=[(A-Za-zé.,;] )|(?<=\())(?:1[5-9]|20)\d\d(?=[,;.:)\s]|$)(?! ?(?:K|px|mm|nm|µm|m|DN|e⁻|photons|electrons"
      r"|pixels|[×x%°–]))", "a year"),
-    (r"\d+(?:–\d+)? minutes?|(?m:(?<=\? )\| \d+ \|$)|(?m:\| \d+ hours \|$)",
+    (r"\d+(?:–\d+)? minutes?|(?m:(?<=\? )\| \d+ \|$)|(?m:\| (?:cores )?\d+ hours.*\|$)",
      "a plan; tests hold that the places agree"),
     (r"(?m)^\| \d\d \|", "the number of a lesson"),
     (r"\(\d{4}–\d{4}\)", "the years of a life"),

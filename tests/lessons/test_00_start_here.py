@@ -1,8 +1,11 @@
 """What lesson 00 and the glossary say."""
 
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
+import yaml
 from scipy.spatial.transform import Rotation
 
 from camviz.cameras import Intrinsics
@@ -13,6 +16,8 @@ from camviz_school.course.glossary import term
 from camviz_school.views.exposure import ExposureView
 
 EXCEPTIONS: dict[str, str] = {}
+
+DATA = Path(__file__).parents[1] / "data"
 
 
 def test_a_value_that_makes_no_sense_is_answered(says):
@@ -141,6 +146,21 @@ def test_dither_lets_means_tell_apart_what_is_finer_than_a_step(says):
     low, high = (np.rint(light + noise).mean() for light in (3.2, 3.4))
     assert high - low == pytest.approx(0.2, abs=0.01)
     assert np.rint(3.2) == np.rint(3.4)
+
+
+def test_the_focal_length_in_k_is_the_distance_to_the_sensor(says):
+    more, f, metres = says("the same when focused at infinity, and 5.3 % more for 50 mm focused at 1 m")
+    sensor = 1 / (1 / f.value - 1 / (1000 * metres.value))  # 1/f = 1/u + 1/v
+    assert more == 100 * (sensor / f.value - 1)
+
+
+def test_in_which_form_files_give_rotations(says):
+    rows, columns = says("while Kalibr writes 4×4 matrices and COLMAP quaternions.")
+    chain = yaml.safe_load((DATA / "kalibr_chain.yaml").read_text(encoding="utf-8"))
+    assert np.shape(chain["cam1"]["T_cn_cnm1"]) == (rows.value, columns.value)
+    lines = (DATA / "colmap" / "images.txt").read_text(encoding="utf-8").splitlines()
+    _, *pose = next(line for line in lines if not line.startswith("#")).split()
+    assert np.linalg.norm(np.array(pose[:4], dtype=float)) == pytest.approx(1, abs=1e-6)  # and three of t follow
 
 
 def test_the_two_telecentric_lenses(says):

@@ -367,12 +367,18 @@ def test_with_the_framing_held_the_depth_of_field_hardly_changes(says):
     says("Notice that the bush and the picture of the cat grow behind it.")
     walked = [image(f, f * (1 + 45)) / (f * (1 + 45) + 1400) for f in (35, 100)]  # of what is 1.4 m behind the globe
     assert walked[1] > 1.2 * walked[0]
-    c, m = 0.03, 1 / 45
-    rule = 2 * 5.6 * c * (1 + m) ** 2 / m**2
-    depths = [np.diff(limits(f, 5.6, f * (1 + 1 / m), c))[0] for f in (35, 50, 100)]
+    says("As long as s is much smaller than H, far − near ≈ 2 N c s (s − f)/f².")
+    N, c, m = 5.6, 0.03, 1 / 45
+
+    def rule(m):  # of the formula under it
+        return 2 * N * c * (1 + m) / m**2
+
+    depths = [np.diff(limits(f, N, f * (1 + 1 / m), c))[0] for f in (35, 50, 100)]
+    life_size = np.diff(limits(35, N, 2 * 35, c))[0]
+    assert life_size == pytest.approx(rule(1), abs=5e-4) == pytest.approx(0.672)
     np.testing.assert_allclose(depths, [730, 712, 700], atol=0.5)  # as cell 37 prints
     assert max(depths) / min(depths) < 1.05
-    np.testing.assert_allclose(depths, rule, rtol=0.04)
+    np.testing.assert_allclose(depths, rule(m), rtol=0.05)
     long, short = says("nearly three times as much at 100 mm as at 35 mm")
     discs = [blur(f.value, 5.6, f.value * (1 + 1 / m), 1e12) for f in (short, long)]
     assert discs[1] / discs[0] == pytest.approx(3, rel=0.06)
@@ -400,7 +406,7 @@ def test_the_entrance_pupil_of_the_triplet(says):
     """By rays out of the middle of the stop and from its rim, through the two elements in front of it, backwards."""
     stop, pupil, wider = says(
         "In the triplet the stop lies 10.3 mm behind the first surface. Seen through the two elements in front of it, "
-        "it appears at 11.5 mm, and 1.32 times as wide."
+        "it appears at 11.5 mm, and 1.32 times as wide. This width is the D in N = f/D."
     )
     surfaces = optics.COOKE_TRIPLET.surfaces[:4]
     assert stop == sum(distance for _, distance, _ in surfaces[:-1])

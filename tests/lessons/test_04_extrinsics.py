@@ -194,7 +194,7 @@ def test_near_the_lock_a_small_turn_makes_angles_jump(says):
 
 def test_four_ways_to_write_a_rotation(says, rng):
     (three,) = says("| 3 | telling a person |")
-    (vector,) = says("| 3 | calibration files, optimisation | not a list of three angles |")
+    (vector,) = says("| 3 | OpenCV's files, optimisation | not a list of three angles |")
     (turn,) = says("rotation vectors by θ and by θ + 360° are the same rotation, and so are the quaternions q and −q")
     (four,) = says("| 4, of length 1 | storing, blending | scalar last or first |")
     (nine,) = says("| 9, with RᵀR = I and det R = 1 | computing |")

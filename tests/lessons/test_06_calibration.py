@@ -329,7 +329,7 @@ def test_the_board_and_its_numbers(says):
     assert columns == board.columns
     assert rows == board.rows
     assert square == 1000 * board.square_size
-    rows, columns = says("A 3 × 3 matrix ties board and picture")
+    rows, columns = says("A 3 × 3 matrix of free scale takes the board's plane to the picture")
     H, _ = cv2.findHomography(board.corners[:, :2], CalibrationView().corners[0])
     assert (rows.value, columns.value) == H.shape
     says("Because a homography has no inverse.")
@@ -383,9 +383,17 @@ def test_parallel_boards_and_boards_that_lean_about_a_row(says):
     assert stays == rank(np.degrees(in_its_plane), ALL_SIX)
     (three,) = says("Two boards that both lean about a row of the picture give rank 3, one less than it takes.")
     assert three == rank([(30, 0, 0), (-20, 0, 0)], NO_SKEW) == len(NO_SKEW) - 2
-    says("Each must be tilted about another, slanting axis: parallel boards are worth one.")
-    says("Two, if the boards are tilted about different axes.")
+    says("Two tilted about a row and a column suffice, mirrored ones do not. Parallel boards are worth one.")
+    says("Two, such as one tilted about a row of the picture and one about a column.")
     assert rank([(30, 0, 0), (0, 25, 0)], NO_SKEW) == len(NO_SKEW) - 1
+    about_row, about_column, *mirrored = says(
+        "So do two that mirror each other, such as (20, 22)° and (20, −22)° about a row and a column."
+    )
+    turns = [(about_row.value, about_column.value, 0), (*(one.value for one in mirrored), 0)]
+    assert rank(turns, NO_SKEW) == len(NO_SKEW) - 2
+    says("and so are two about slanting axes that do not mirror each other.")
+    for upside_down, expected in (((-20, 22, 0), 3), ((-20, -22, 0), 4), ((22, 20, 0), 4)):
+        assert rank([(20, 22, 0), upside_down], NO_SKEW) == expected
     says("one board is enough if it is tilted about a slanting axis. Hold it flat and both equations are lost")
     says("tilt it about a row or a column and one is")
     assert rank([(25, 20, 0)], F_ALONE, centre=(0, 0)) == 2
@@ -710,7 +718,6 @@ def test_the_photographs_and_the_second_one(says, taken):
     moved, said, seen = says(
         "fx has moved by 1.9 pixels. By the noise of independent corners it had claimed ± 0.93, half of that: such a σ "
         "does not know about blunders either. The ± 2.1 printed here does: camviz leaves out each photograph in turn, "
-        "and σ is how far the solutions scatter."
     )
     assert said == deviations[0, 0]
     (told,) = says(
@@ -754,6 +761,29 @@ def test_other_boards_have_no_large_errors_there(says, taken):
     errors = np.concatenate(errors)
     assert len(errors) > 20
     assert np.sqrt(np.mean(errors**2)) < 0.5
+
+
+def test_sigma_by_the_photographs_is_a_multiple_of_their_scatter(says, taken):
+    times, n = says("σ is (n − 1)/√n, here 3.3, times the scatter of the 13 solutions (jackknife).")
+    assert n == len(taken)
+    assert times == (n.value - 1) / np.sqrt(n.value)
+    fx = [by_opencv(np.delete(taken, i, axis=0))[1][0, 0] for i in range(len(taken))]
+    (seen,) = says("The ± 2.1 printed here does")
+    assert times.value * np.std(fx, ddof=1) == pytest.approx(seen.value, rel=0.15)  # camviz's is to first order
+
+
+def test_foreshortening_alone_is_other_pixels(says):
+    """A board tilted about a row: two cameras, of other fx / fy, take one picture of it, from other tilts."""
+    says("How much larger the near one looks depends on the tilt and on Z, not on fx.")
+    says("Foreshortening tells the tilt, if fx/fy is known or the axis slants.")
+    pictures = []
+    for times in (1.0, 1.4):
+        sine = 0.4 * times
+        fx, fy = 500 * times, 500 * times * np.sqrt((1 - 0.4**2) / (1 - sine**2))
+        K, Z = np.array([[fx, 0, 320], [0, fy, 240], [0, 0, 1]]), 0.5 * times
+        pictures.append(cv2.projectPoints(BOARD, np.array([np.arcsin(sine), 0, 0]), np.array([0, 0, Z]), K, None)[0])
+    np.testing.assert_allclose(*pictures, atol=1e-3)
+    assert fx / fy < 0.95
 
 
 def test_without_it(says, taken):

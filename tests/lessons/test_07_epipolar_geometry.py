@@ -288,6 +288,29 @@ def test_normalising_pays_the_more_the_more_pairs_there_are(says):
     assert better(few[0].value, rng) == pytest.approx(1, abs=0.1)
 
 
+def equations(points, centre, R):
+    """The rank of the equations for F of points (n, 3), seen from 0 and from a centre by a camera turned by R."""
+    A = ((points - centre) @ R.T)[:, :, None] * points[:, None, :]
+    return np.linalg.matrix_rank(A.reshape(-1, 9), tol=1e-9)
+
+
+def test_eight_pairs_must_be_in_general_position(says):
+    says("so eight pairs in general position are enough, but not seven on one plane and one beside.")
+    says("nor any number on a ruled quadric that holds the centres of both cameras.")
+    rng, R = np.random.default_rng(1), Rotation.from_rotvec([0.05, -0.2, 0.1]).as_matrix()
+    points, centre = rng.uniform([-2, -1, 3], [2, 1, 8], (8, 3)), np.array([0.7, 0.1, -0.1])
+    assert equations(points, centre, R) == 8
+    points[:6, 2] = 5 + 0.3 * points[:6, 0]
+    assert equations(points, centre, R) == 8
+    points[6, 2] = 5 + 0.3 * points[6, 0]
+    assert equations(points, centre, R) == 7
+    z, turn = rng.uniform(-1, 1, 102), rng.uniform(0, 2 * np.pi, 102)
+    sheet = np.stack([np.hypot(1, z) * np.cos(turn), np.hypot(1, z) * np.sin(turn), z], axis=-1)  # x² + y² − z² = 1
+    left, right, points = sheet[0], sheet[1], sheet[2:]
+    assert equations(points - left, right - left, R) == 7
+    assert equations(points - left, right - left + [0.1, 0.2, 0.1], R) == 8
+
+
 def test_the_eight_pairs_and_no_pair_to_spare(says):
     eight, most = says("Set **matches** to 8: with no pair to spare, every error goes into F. Set it to 100.")
     left, right = EpipolarView(matches=int(eight.value)).pairs
@@ -801,13 +824,30 @@ def test_before_the_lesson_a_camera_that_pans(says):
     (angle,) = says("A calibrated camera on a pole pans by 20° between two pictures and does not move from its place.")
     (claimed,) = says("A turn of 20°, and no way.")
     assert claimed == angle.value
-    says("Many different answers fit these pairs exactly")
+    (right,) = says("A turn of 20°, and a direction that means nothing.")
+    assert right == angle.value
+    says("The right turn with any direction fits these pairs exactly, and noise picks the direction.")
+    says("An F that holds the right R, and an epipole that means nothing.")
+    says("Without a baseline an F of every epipole satisfies all pairs, and noise picks one.")
     R = Rotation.from_euler("y", angle.value, degrees=True).as_matrix()
     x = np.random.default_rng(8).uniform([-1, -1, 2], [1, 1, 5], (20, 3))
     A = ((x @ R.T)[:, :, None] * x[:, None, :]).reshape(-1, 9)
     assert np.linalg.matrix_rank(A) == 9 - 3
     for axis in np.eye(3):
         assert np.abs(A @ (cross_matrix(axis) @ R).ravel()).max() < 1e-12
+    K, rng, off, directions = np.array([[800.0, 0, 320], [0, 800, 240], [0, 0, 1]]), np.random.default_rng(9), [], []
+    for _ in range(50):
+        left = rng.uniform([0, 0], [640, 480], (400, 2))
+        right = cv2.perspectiveTransform(left[None], K @ R @ np.linalg.inv(K))[0]
+        left, right = (
+            one[right[:, 0] < 640] + rng.normal(0, 0.5, (400, 2))[right[:, 0] < 640] for one in (left, right)
+        )
+        F = cv2.findFundamentalMat(left, right, cv2.FM_8POINT)[0]
+        *turns, t = cv2.decomposeEssentialMat(K.T @ F @ K)
+        off.append(min(np.degrees(Rotation.from_matrix(turn @ R.T).magnitude()) for turn in turns))
+        directions.append(t.ravel())
+    assert np.median(off) < 0.2
+    assert np.sqrt(np.mean(np.square(directions), axis=0)).min() > 0.3  # they point anywhere
 
 
 def test_before_the_lesson_four_motions(says):

@@ -101,7 +101,7 @@ def test_turning_a_camera_is_a_map_by_a_3_by_3_matrix_whatever_the_depth(says):
 
 
 def test_the_rectified_cameras_are_not_parallel_to_the_wall(says, garden):
-    says("The wall in front of these cameras is not, rectified or not.")
+    says("The wall here is not, rectified or not.")
     axes = {side: WORLD_FROM[side].rotation.as_matrix() for side in SIDES}
     for matrix in (*axes.values(), axes["left"] @ garden["R"]["left"].T):
         assert np.degrees(np.arccos(matrix[2, 2])) > 1  # the wall's normal is the world's z axis

@@ -204,11 +204,21 @@ def test_the_published_lens(says):
     point = np.array([1.0, y.value, z.value])
     theta = np.arctan2(np.hypot(*point[:2]), point[2])
     np.testing.assert_allclose(F * g(theta) * point[:2] / np.hypot(*point[:2]) + C, by_opencv(point), atol=1e-9)
-    off, pixels = says("The lens of section 2 keeps to the equidistant one within 2.1 px of 1024")
+    off, pixels, to = says(
+        "The lens of section 2 keeps to the equidistant one within 2.1 px of 1024 up to 78° from the axis."
+    )
+    assert to == np.degrees(max(sides))
     theta = np.linspace(0, max(sides), 1000)
     assert off == (F[0] * np.abs(g(theta) - theta)).max()
     assert off.value > (F[0] * np.abs(g(theta) - theta)).max()  # within: not rounded down
     assert pixels == width.value
+    *beyond, at_fold = says("It is off by 7 px at 90°, 25 px at 100° and 78 px at its fold.")
+    for missed, degrees in zip(beyond[::2], beyond[1::2], strict=True):
+        angle = np.radians(degrees.value)
+        assert missed == F[0] * (angle - g(angle))
+    assert at_fold == F[0] * (fold() - g(fold()))
+    theta = np.radians(78.0)  # in front, where OpenCV's own polynomial can be asked
+    assert by_opencv(ray(theta))[0] - C[0] == pytest.approx(F[0] * g(theta))
 
 
 def test_opencv_mirrors_what_is_behind(says):

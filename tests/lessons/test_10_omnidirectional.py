@@ -138,8 +138,8 @@ def test_conics_reflect_what_aims_at_one_focus_into_the_other(says, e):
 
 def test_a_paraboloid_makes_them_parallel_and_a_plane_is_one_more_and_a_sphere_is_none(says):
     says("For the paraboloid the other focus is infinitely far, so its camera is orthographic.")
-    says("A plane and the inside of an ellipsoid are the only others of use")
-    says("only a plane, an ellipsoid, a hyperboloid or a paraboloid has a single viewpoint")
+    says("Others are a plane and the inside of an ellipsoid")
+    says("only a plane, a cone, an ellipsoid, a hyperboloid or a paraboloid has a single viewpoint")
     x = np.array([0.2, 0.5, 0.9])
     on = np.stack([x, 0.5 - x**2 / 2], axis=-1)  # its focus is the origin
     out = reflected(-on / np.linalg.norm(on, axis=-1, keepdims=True), np.stack([x, np.ones(3)], axis=-1))
@@ -156,7 +156,7 @@ def test_a_paraboloid_makes_them_parallel_and_a_plane_is_one_more_and_a_sphere_i
 
 def test_plane_and_ellipsoid_show_half_of_all_directions_at_most(says):
     """A ray that aims at the viewpoint must come past the mirror: where the mirror is in direction d, none is in −d."""
-    says("neither can show more than half of all directions")
+    says("which cannot show more than half of all directions, and a cone.")
     directions = np.random.default_rng(0).normal(size=(10000, 3))
     mirror = directions[:, 2] > 0  # as much as may be: with more, some −d would be on the mirror too
     assert not (mirror & ((-directions)[:, 2] > 0)).any()
@@ -167,6 +167,12 @@ def test_the_xi_of_mirrors_goes_from_0_to_1(says):
     says("No mirror has such a ξ, but the formula still works.")
     e = np.linspace(0, 50, 5001)
     assert (2 * e / (1 + e**2)).max() == pytest.approx(1)
+    says("a hyperbolic or elliptic mirror.")
+    theta = np.radians([20.0, 50.0, 80.0])
+    for e in (0.5, 2.0):  # the mirror's point 1/(1 + e cos θ) away in each direction, seen from the other focus
+        x, z = np.sin(theta) / (1 + e * np.cos(theta)), np.cos(theta) / (1 + e * np.cos(theta)) - 2 * e / (e**2 - 1)
+        ratio = x / z / unified(at_angle(np.degrees(theta)), 1.0, 2 * e / (1 + e**2))[:, 0]
+        np.testing.assert_allclose(ratio, ratio[0])
     (axis,) = says("No direction at 90° from the axis or beyond has an image.")
     assert at_angle(axis.value)[2] == pytest.approx(0)
     says("This is a parabolic mirror, and also a *lens*, the stereographic fisheye")

@@ -40,6 +40,16 @@ def seeds(thorough):
     return range(50 if thorough else 1)
 
 
+@pytest.mark.parametrize("number", HELD)
+def test_exercises_are_numbered_as_they_stand_on_the_sheet(number):
+    (path,) = LESSONS.glob(f"{number}_*.ipynb")
+    cells = notebooks.read(path).cells
+    stubs = [notebooks.exercise_of(cell) for cell in cells if "stub" in cell.metadata.get("tags", [])]
+    assert stubs == list(exercises(number))
+    numbers = re.findall(r"(?m)^###+ Exercise (\d+):", "\n".join(cell.source for cell in cells))
+    assert [int(one) for one in numbers] == list(range(1, len(numbers) + 1))
+
+
 @pytest.mark.sampled(40)
 @EACH
 def test_no_wrong_function_is_accepted_and_each_is_answered_by_its_own_reply(one, seeds):

@@ -54,8 +54,8 @@ def learn(lessons: list[Lesson], shown: dict[str, str]) -> str:
     )
     return (
         "# Learn\n\n"
-        f"{len(lessons)} lessons, about {hours:.0f} hours in all. Begin with the first, or with the question that "
-        "brings you here. Your answers stay in this browser.\n\n"
+        f"{len(lessons)} lessons, about {hours:.0f} hours for their cores. Begin with the first, or with the question "
+        "that brings you here. Your answers stay in this browser.\n\n"
         f"{paths.table(lessons, 'lessons/')}\n\n"
         f"```{{toctree}}\n:hidden:\n\n{toctree}\ndocs/glossary\nlessons/conventions\n```\n\n"
         f'<div class="course-map">\n{parts}</div>\n\n'

@@ -63,7 +63,7 @@ PROJECT = Exercise(
         "The two similar triangles have their tips in the hole. Which of a point's three numbers is the length of its "
         "triangle, and so divides the other two?",
         "`points[..., :2]` holds X and Y of every point, and `points[..., 2:]` its Z, with the last axis kept so that "
-        "one Z divides both. Multiply by f, and then count from the corner of the image.",
+        "one Z divides both. Multiply by f, and then count from the centre of the first pixel.",
         "`return f * points[..., :2] / ___ + ___`",
     ),
     praise="These are the pixels that camviz and OpenCV give, for one point and for any array of them.",
@@ -93,7 +93,7 @@ def point_by_point(points, f, cx, cy):
     return np.reshape(pixels, (*points.shape[:-1], 2))
 
 
-@PROJECT.wrong("This is measured from the principal point. A pixel counts from the corner of the image: add (cx, cy).")
+@PROJECT.wrong("This counts from the principal point. Pixels count from the centre of the first one: add (cx, cy).")
 def from_the_principal_point(points, f, cx, cy):
     return f * points[..., :2] / points[..., 2:]
 
@@ -252,8 +252,8 @@ def point_at_depth_f(uv, f, cx, cy):
 
 
 @RAY.wrong(
-    "This is the ray of the pixel counted from the principal point. Here (u, v) counts from the corner of the image: "
-    "subtract (cx, cy) first."
+    "This is the ray of the pixel counted from the principal point. Here (u, v) counts from the centre of the first "
+    "pixel: subtract (cx, cy) first."
 )
 def principal_point_forgotten(uv, f, cx, cy):
     return ray(uv, f, 0.0, 0.0)
@@ -474,7 +474,7 @@ def turned_to_the_front_first(direction, f, cx, cy):
     return _opencv_s(direction * np.sign(direction[..., 2:]), f, cx, cy)
 
 
-@VANISHING.wrong("This counts from the principal point. A pixel counts from the corner of the image: add (cx, cy).")
+@VANISHING.wrong("You count from the principal point. Pixels count from the centre of the first one: add (cx, cy).")
 def meeting_point_without_c(direction, f, cx, cy):
     return f * direction[..., :2] / direction[..., 2:]
 

@@ -740,4 +740,4 @@ def always_fifty(surfaces):
     return 50.0
 
 
-EXERCISES = (IMAGE, BLUR, LIMITS, VIEW, ELEMENTS)
+EXERCISES = (IMAGE, BLUR, VIEW, LIMITS, ELEMENTS)

@@ -128,7 +128,7 @@ def zero_appended(uv, K):
     return _unit(_append(uv, 0) @ np.linalg.inv(K).T)
 
 
-@RAY.wrong("The principal point was never taken away: rays count from the optical axis, not from the image's corner.")
+@RAY.wrong("You never take the principal point away. Rays count from the optical axis, and not from the first pixel.")
 def principal_point_forgotten(uv, K):
     return ray(uv + K[:2, 2], K)
 
@@ -604,4 +604,4 @@ def from_the_right(K, x0, y0, n):
     return K @ crop @ bins
 
 
-EXERCISES = (RAY, FIELD_OF_VIEW, RESIZED, CROPPED_THEN_BINNED)
+EXERCISES = (RAY, RESIZED, FIELD_OF_VIEW, CROPPED_THEN_BINNED)

@@ -767,4 +767,4 @@ def half_the_angle(r):
     return rodrigues(r / 2)
 
 
-EXERCISES = (CENTRE, RODRIGUES, CHAIN, INVERT, IS_ROTATION)
+EXERCISES = (CENTRE, CHAIN, RODRIGUES, INVERT, IS_ROTATION)

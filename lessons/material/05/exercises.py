@@ -651,13 +651,13 @@ def row_first(width, height, f, k1):
     return undistort_map(width, height, f, k1)[..., ::-1]
 
 
-@UNDISTORT_MAP.wrong("The centre is never added back: the map points at the upper left corner and beyond it.")
+@UNDISTORT_MAP.wrong("The centre is never added back: the map points at the upper left pixel and beyond it.")
 def centre_not_added(width, height, f, k1):
     return undistort_map(width, height, f, k1) - np.array([(width - 1) / 2, (height - 1) / 2])
 
 
 @UNDISTORT_MAP.wrong(
-    "The centre is never subtracted, so r is measured from the upper left corner. The lens bends about the principal "
+    "The centre is never subtracted, so r is measured from the upper left pixel. The lens bends about the principal "
     "point."
 )
 def bent_about_the_corner(width, height, f, k1):

@@ -48,7 +48,8 @@ def constraints(H: ArrayLike) -> Array:
 def camera_matrix(homographies: Sequence[ArrayLike], skew: bool = False) -> Array:
     """The one camera matrix behind all these homographies, in closed form and without distortion.
 
-    Boards that are parallel count as one, and boards tilted about one and the same row or column leave K undetermined.
+    Boards that are parallel count as one. Two that are tilted about the same row or column, or that mirror each other,
+    leave K undetermined.
 
     Args:
         homographies: sequence of (3, 3), from the board's plane in metres to pixels: at least two, or three where skew
@@ -165,7 +166,7 @@ def _null_vector(V: Array) -> Array:
     _, s, Vt = np.linalg.svd(np.vstack([V / size, np.zeros(len(size))]), full_matrices=False)
     if not s[-2] > _UNDECIDED * s[0]:
         raise ValueError(
-            "these boards determine no camera matrix: they are parallel, and count as one, or tilted about one axis"
+            "these boards determine no camera matrix: they are parallel, mirrored, or tilt about one row or column"
         )
     return Vt[-1] / size
 

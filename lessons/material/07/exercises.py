@@ -989,4 +989,4 @@ def dimension_and_parameters_swapped(distances, dimension, parameters, sigma):
     return residuals + _penalty(distances, parameters, dimension)
 
 
-EXERCISES = (FUNDAMENTAL, LINE, EPIPOLE, EIGHT_POINT, IN_FRONT, SAMPSON, GRIC)
+EXERCISES = (FUNDAMENTAL, LINE, EPIPOLE, EIGHT_POINT, SAMPSON, GRIC, IN_FRONT)

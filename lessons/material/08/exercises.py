@@ -993,4 +993,4 @@ def clipped(c_before, c_best, c_after):
     return np.clip(followed_too_far(c_before, c_best, c_after), -0.5, 0.5)
 
 
-EXERCISES = (RECTIFIED, LEFT_RIGHT, BASELINE, DEPTH, BETWEEN, METRIC_DEPTH)
+EXERCISES = (RECTIFIED, DEPTH, BASELINE, LEFT_RIGHT, BETWEEN, METRIC_DEPTH)

@@ -150,7 +150,7 @@ def degrees(points, f, cx, cy):
     return f * _placed(points, np.degrees(_theta(points))) + (cx, cy)
 
 
-@EQUIDISTANT.wrong("The principal point is missing: pixels begin in the corner of the image, so add (cx, cy).")
+@EQUIDISTANT.wrong("The principal point is missing: pixels count from the centre of the first one, so add (cx, cy).")
 def without_the_principal_point(points, f, cx, cy):
     return f * _placed(points, _theta(points))
 
@@ -775,8 +775,8 @@ def nothing_on_the_axis(width, height, f_window, yaw, f, cx, cy):
 
 
 @WINDOW_MAP.wrong(
-    "The pixel that looks along the axis itself comes out at (0, 0), the corner of the fisheye's picture. It is at "
-    "(cx, cy): only its r is 0."
+    "The pixel that looks along the axis itself comes out at (0, 0), the first pixel of the fisheye's picture. It is "
+    "at (cx, cy): only its r is 0."
 )
 def the_corner_on_the_axis(width, height, f_window, yaw, f, cx, cy):
     return np.nan_to_num(nothing_on_the_axis(width, height, f_window, yaw, f, cx, cy))
@@ -848,7 +848,7 @@ def focal_lengths_swapped(width, height, f_window, yaw, f, cx, cy):
 
 
 @WINDOW_MAP.wrong(
-    "The middle of the window is never subtracted, so that its upper left corner looks straight ahead before the turn."
+    "The middle of the window is never subtracted, so that its upper left pixel looks straight ahead before the turn."
 )
 def corner_for_the_middle(width, height, f_window, yaw, f, cx, cy):
     u, v = np.meshgrid(np.arange(width), np.arange(height))
