@@ -149,10 +149,10 @@ def _crossings(panel: Panel, camera: Catadioptric) -> Marks:
     """Where neighbouring rays cross: in one point, or along a caustic."""
     caustic = 1000 * camera.caustic(np.linspace(0.02, 0.985, 60) * camera.rim())
     if np.nanmax(np.ptp(caustic, axis=0)) > 1e-3:  # micrometres
-        words, mark = "caustic: no single viewpoint", [panel.place(caustic * side) for side in ((1, 1), (-1, 1))]
-        return svg.path(mark, "red thick") + svg.text((panel.width / 2, 18), words, "label red halo middle")
-    words = svg.text((panel.width / 2, 18), "one viewpoint: the focus", "label red halo middle")
-    return svg.dots([panel.place((0, 0))], "red", 8) + words
+        both, words = [panel.place(caustic * side) for side in ((1, 1), (-1, 1))], "caustic: no single viewpoint"
+        return svg.path(both, "red thick") + svg.text((panel.width / 2, 18), words, "label red halo middle")
+    dot = svg.dots([panel.place((0, 0))], "red", 8)
+    return dot + svg.text((panel.width / 2, 18), "one viewpoint: the focus", "label red halo middle")
 
 
 # The sphere ----------------------------------------------------------------------------------------------------------
