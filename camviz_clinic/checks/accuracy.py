@@ -92,7 +92,8 @@ class CameraAccuracy:
 
     def values(self) -> dict[str, Any]:
         """The numbers, for programs; None where there is none."""
-        return {key: value if isinstance(value, str) or isfinite(value) else None for key, value in asdict(self).items()}
+        told = asdict(self).items()
+        return {key: value if isinstance(value, str) or isfinite(value) else None for key, value in told}
 
     def sentence(self, subject: str = "") -> str:
         """What the camera is good for; `subject` names it where there are several."""
@@ -100,8 +101,8 @@ class CameraAccuracy:
         where = f"in the {100 * self.coverage:.0f} % of the image that the boards covered"
         if not self.covered_sufficient:
             begin = f"{subject}: n" if subject else "N"
-            known = known_to(self.covered_deg, self.covered_px)
-            return f"{begin}ot good for measuring: {known} {where}. Add sharp images of tilted boards all over the image."
+            known = f"{known_to(self.covered_deg, self.covered_px)} {where}"
+            return f"{begin}ot good for measuring: {known}. Add sharp images of tilted boards all over the image."
         good = f"{begin}ood to {known_to(self.covered_deg)} {where}"
         if not isfinite(self.corner_px) and self.corners_sufficient:
             return f"{good}; a corner has no ray."
@@ -120,7 +121,9 @@ def accuracy(evidence: Evidence, task: Sequence[TaskError] = ()) -> Accuracy:
     if not evidence.calibration.detections:
         return NO_DETECTIONS
     cameras = {name: camera_accuracy(evidence, name) for name in evidence.cameras}
-    known = [each for each in cameras.values() if each]
+    known = [each for each in cameras.values() if each and each.covered_px > 0]
+    if not known and all(cameras.values()):
+        return Accuracy("Its accuracy is not known: no camera was solved for.")
     pairs = [each for each in (_pair_accuracy(error) for error in task) if each]
     sentences = [min(pairs, key=lambda each: bool(each.sufficient)).sentence] if pairs else []
     if known:
@@ -175,10 +178,10 @@ def _pair_accuracy(error: TaskError) -> Accuracy | None:
     total, own = (np.array([error.values[f"{key}_{z:g}m_mm"] for z in depths]) for key in ("depth", "calibration"))
     disparity_px = MATCHING_PX * float(np.min(own / np.sqrt(total**2 - own**2)))
     if disparity_px > MAX_DISPARITY_SIGMA_PX:
-        known = f"±{two_digits(disparity_px)} px of disparity, ±{_percent(own[0], depths[0])} of depth at {depths[0]:g} m"
+        known = f"±{_percent(own[0], depths[0])} at {depths[0]:g} m by the calibration alone"
         return Accuracy(f"Depth is not good for measuring: {known}. Add image pairs with a tilted board.", False)
     ends = " and ".join(f"±{_percent(total[i], depths[i])} at {depths[i]:g} m" for i in (0, -1))
-    return Accuracy(f"Depth is good to {ends}.", True)
+    return Accuracy(f"Depth at the centre is good to {ends}, with matches to ±{MATCHING_PX:g} px.", True)
 
 
 def known_to(degrees: float, px: float | None = None) -> str:

@@ -16,7 +16,7 @@ from camviz_clinic.calibration.enumeration import enumerated
 from camviz_clinic.calibration.guidance import instruction, next_board_poses
 from camviz_clinic.calibration.types import Calibration
 from camviz_clinic.calibration.uncertainty import largest_expected_error, projection_uncertainty
-from camviz_clinic.checks.accuracy import Accuracy, accuracy
+from camviz_clinic.checks.accuracy import MAX_DIRECTION_SIGMA_PX, Accuracy, accuracy
 from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.stamps import holds_for
 from camviz_clinic.checks.task import TaskError, image_corners, task_errors
@@ -129,9 +129,8 @@ class Summary:
 
     @property
     def worth(self) -> tuple[str, ...]:
-        """What the task errors say beyond `accuracy`, which has the direction error of a camera that is alone."""
-        alone = len(self.evidence.cameras) == 1 and self.at is None and self.accuracy.sufficient is not None
-        return tuple(each.sentence for each in self.task if not (alone and len(each.cameras) == 1))
+        """What the task errors say beyond `accuracy`: the depths of pairs, and errors at a distance."""
+        return tuple(each.sentence for each in self.task if self.at is not None or len(each.cameras) > 1)
 
     @cached_property
     def largest_errors(self) -> dict[str, float]:
@@ -238,6 +237,8 @@ class Summary:
         longer = max(self.calibration.cameras[name].intrinsics.width, self.calibration.cameras[name].intrinsics.height)
         off = f"{largest:.2g} px off" if largest < longer else "farther off than the picture is long"
         said = f"where it is worst{of}, a far point is expected to be {off} (Max ERE)"
+        if largest <= self.goal <= MAX_DIRECTION_SIGMA_PX and self.accuracy.sufficient is False:
+            return ""  # what the accuracy asks for comes first
         if largest <= self.goal:
             return f"There are enough pictures: {said}, within the goal of {self.goal:g} px."
         try:

@@ -92,9 +92,7 @@ def _of_camera(adjustment: Adjustment, name: str, at: float | None) -> TaskError
     if not np.isfinite(middle):
         return TaskError((name,), "", {})
     if middle > ANYWHERE_DEG:
-        return TaskError(
-            (name,), f"{name}: the direction error is not known.", {"angle_centre_deg": float(middle)}
-        )
+        return TaskError((name,), f"{name}: the direction error is not known.", {"angle_centre_deg": float(middle)})
     known = "not known in the worst corner" if worst > ANYWHERE_DEG else f"±{worst:.2g}° in the worst corner"
     known = known if np.isfinite(worst) else "a corner has no ray"
     said = f"{name}: direction error ±{middle:.2g}° at the centre, {known}"

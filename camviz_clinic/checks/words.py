@@ -61,7 +61,7 @@ def verdict(
         below = f", {counted(findings)} below" if findings else ""
         ran = f"{len(checked)} checks ran{_lacking(skipped)}."
         if accuracy.sufficient is False:
-            return f"{accuracy.sentence} {ran[:-1]}{below}."
+            return f"{accuracy.sentence} {f'{counted(findings)} below; ' * bool(findings)}{ran}"
         found = f"No problem found{' beside what is ignored' * bool(ignored)}{below}"
         if accuracy.sufficient:
             return f"{accuracy.sentence} {found}; {ran}"
