@@ -131,7 +131,7 @@ def accuracy(evidence: Evidence, task: Sequence[TaskError] = ()) -> Accuracy:
         sentences.append(worst.sentence(f"The least accurate camera, {worst.camera}" if len(cameras) > 1 else ""))
     if unknown := [name for name, each in cameras.items() if each is None]:
         sentences.append(f"Accuracy is not known of {enumerated(unknown)}: the corners do not determine it.")
-    sufficient = not unknown and all(each.sufficient for each in [*known, *pairs])
+    sufficient = not unknown and all(each.sufficient for each in known) and all(each.sufficient for each in pairs)
     return Accuracy(" ".join(sentences), sufficient, tuple(each.values() for each in known))
 
 
