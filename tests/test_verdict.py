@@ -54,6 +54,7 @@ def said(*cameras, monkeypatch):
         ({"covered_px": 4.99}, {"covered_px": 5.01}, "Not good for measuring: ±0.5° (±5 px) in the 60 % of the image"),
         ({"halves_px": 9.98}, {"halves_px": 10.02}, ", and halves of the images differ by 10 px: add images with"),
         ({}, {"halves_px": np.inf}, ", and half of the images give a lens without a ray there: add images with"),
+        ({"corner_px": np.nan}, {"corner_px": np.inf}, "In the worst corner the lens has no ray: add images with"),
         ({"corner_px": np.nan}, {"corner_px": np.nan, "halves_px": 11.0}, "In the worst corner halves of the images"),
     ],
 )
@@ -109,6 +110,7 @@ def test_a_hand_eye_place_is_useless_beyond_a_hundredth_of_the_distance(mm, deg,
 
 
 def test_healthy_cameras_have_no_problem_and_boards_in_the_middle_do():
+    """The third lens turns back before all four corners, where no board was."""
     for seed in range(5):
         calibration = healthy(np.random.default_rng(seed))
         assert PRAISE in inspect(calibration).verdict

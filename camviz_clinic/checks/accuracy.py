@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from math import inf, isfinite, nan
+from math import inf, isfinite, isnan, nan
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from camviz_clinic.calibration.enumeration import enumerated
 from camviz_clinic.calibration.uncertainty import projection_uncertainty
 from camviz_clinic.checks.between_views import FEWEST_VIEWS
 from camviz_clinic.checks.evidence import Evidence
-from camviz_clinic.checks.findings.boards import cell_centres, coverage, covered_cells
+from camviz_clinic.checks.findings.boards import cell_centres, coverage, covered_cells, within_reach
 from camviz_clinic.checks.task import ANYWHERE_DEG, DEPTHS, MATCHING_PX, TaskError, direction_deviation, image_corners
 
 MAX_DIRECTION_SIGMA_PX = 5.0
@@ -57,7 +57,8 @@ class CameraAccuracy:
         camera: Its name.
         coverage: The fraction of the image that lies inside the outline of some board.
         covered_deg, covered_px: The largest σ in that part of the image.
-        corner_deg, corner_px: The largest σ in a corner of the image; NaN where a corner has no ray.
+        corner_deg, corner_px: The largest σ in a corner of the image; infinite where the lens turns back before it,
+            and NaN where all corners lie beyond a fisheye's circle.
         halves_px: The difference in a corner of solutions from halves of the images, 0 where noise explains it.
     """
 
@@ -88,7 +89,7 @@ class CameraAccuracy:
     @property
     def largest_px(self) -> float:
         """The largest σ in the covered part and in the corners that have a ray."""
-        return max(self.covered_px, self.corner_px) if isfinite(self.corner_px) else self.covered_px
+        return self.covered_px if isnan(self.corner_px) else max(self.covered_px, self.corner_px)
 
     def values(self) -> dict[str, Any]:
         """The numbers, for programs; None where there is none."""
@@ -109,6 +110,8 @@ class CameraAccuracy:
         if self.corners_sufficient:
             return f"{good}, {known_to(self.corner_deg)} in the worst corner."
         bad = [known_to(self.corner_deg, self.corner_px)] if isfinite(self.corner_px) else []
+        if self.corner_px == inf:
+            bad.append("the lens has no ray")
         if self.halves_px == inf:
             bad.append("half of the images give a lens without a ray there")
         elif self.halves_px:
@@ -148,6 +151,10 @@ def camera_accuracy(evidence: Evidence, name: str) -> CameraAccuracy | None:
         return None
     if not isfinite(inside[1]):
         return None
+    cells = np.ix_((0, -1), (0, -1))  # in the corners
+    rays = camera.lens.unproject(camera.intrinsics.from_pixels(cell_centres(camera)[cells]))
+    if (within_reach(camera)[cells] & ~np.isfinite(rays).all(axis=-1)).any():
+        outside = inf, inf
     return CameraAccuracy(name, coverage(pixels, camera), *inside, *outside, _halves_px(evidence, name))
 
 
