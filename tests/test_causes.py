@@ -122,7 +122,7 @@ def test_the_fault_that_was_put_in_is_named_first(name):
 
 def test_nothing_wrong_has_no_cause():
     assert inspect(faults()["strong lens"].inject(np.random.default_rng(1), 0.35).calibration).verdict.startswith(
-        "Nothing wrong was found, 1 note below;"
+        "No problem found, 1 note below. "
     )
 
 

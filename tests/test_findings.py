@@ -252,7 +252,7 @@ def test_every_id_has_a_check_and_words_and_is_either_checked_or_skipped_with_a_
 
 def test_the_json_has_the_form_that_the_documentation_gives(left_classic):
     tree = json.loads(inspect(left_classic).as_json())
-    assert list(tree) == ["verdict", "cameras", "task", "findings", "checked", "skipped", "ignored"]
+    assert list(tree) == ["verdict", "cameras", "accuracy", "task", "findings", "checked", "skipped", "ignored"]
     assert list(tree["cameras"][0]) == ["name", "model", "width", "height", "fx", "fy", "cx", "cy", "distortion", "rms"]
     keys = ["id", "severity", "sentence", "value", "unit", "camera", "view", "causes", "remedy"]
     keys += ["consequence_of", "count"]
@@ -265,7 +265,8 @@ def test_the_json_has_the_form_that_the_documentation_gives(left_classic):
 def test_the_worst_comes_first_and_a_healthy_calibration_says_what_was_checked(healthy):
     _, calibration = healthy
     said = inspect(calibration).as_text()
-    assert said.startswith("Nothing wrong was found; 28 checks ran, 10 could not because the file holds one camera")
+    assert said.startswith("Good to ±")
+    assert "No problem found; 28 checks ran, 10 could not because the file holds one camera" in said
     assert "\nNext: " in said
     assert "\nChecked: assumed-coefficients, assumed-reading, not-a-rotation, bad-k" in said
     K = calibration.cameras["camera"]
@@ -425,7 +426,7 @@ def test_a_view_without_corners_is_no_reason_to_stop(healthy):
 
 def test_the_exit_status_is_a_gate(capsys, tmp_path):
     assert main(["inspect", str(DATA / "ros_file.yaml")]) == 0
-    assert capsys.readouterr().out.startswith("Nothing wrong was found, 1 note below; ")
+    assert capsys.readouterr().out.startswith("No problem found, 1 note below. ")
     assert main(["inspect", str(DATA / "opencv_fisheye.yml")]) == 0  # a note
     assert "note fold" in capsys.readouterr().out
     bad = tmp_path / "bad.yaml"

@@ -90,7 +90,7 @@ def test_all_ignored_is_healthy_and_one_line_counts_it():
     found = inspect(wrong(fx=1060.0))
     left = found.ignoring({"aspect"})
     assert (found.healthy, left.healthy) == (False, True)
-    assert left.verdict.startswith("Nothing wrong was found beside what is ignored; ")
+    assert left.verdict.startswith("No problem found beside what is ignored. ")
     assert "\nIgnored: 1 aspect.\n" in left.as_text()
     assert "Ignored: 1 aspect." in findings_html(left)
     assert "gnored" not in found.as_text() + findings_html(found)

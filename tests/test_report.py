@@ -104,7 +104,7 @@ def test_findings_come_first_with_their_words(page):
     for finding in inspection.findings:
         assert finding.id in text
     if not inspection.findings:
-        assert "Nothing wrong was found" in text
+        assert "No problem found" in text
 
 
 def test_the_bars_pictures_and_boards_of_a_view_share_its_number():

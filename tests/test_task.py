@@ -70,7 +70,7 @@ def test_one_camera_and_a_pair_say_what_they_are_worth():
     camera, *_ = task_errors(Evidence(single()), at=2.0)
     assert camera.cameras == ("camera",)
     assert camera.values["at_m"] == 2
-    assert f"±{camera.values['angle_centre_deg']:.2g}° in the middle" in camera.sentence
+    assert f"±{camera.values['angle_centre_deg']:.2g}° at the centre" in camera.sentence
     assert "; at 2 m that is ±" in camera.sentence
     *_, both = task_errors(Evidence(pair()))
     assert both.cameras == ("left", "right")

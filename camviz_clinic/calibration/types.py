@@ -273,6 +273,16 @@ class Calibration:
         seen = np.isfinite(self.detections[name]).all(axis=-1)
         return np.asarray(seen & ~self.set_aside[name] if name in self.set_aside else seen)
 
+    def used_pixels(self, name: str) -> Array:
+        """The corners of a camera that were seen and not set aside.
+
+        Args:
+            name: A camera with detections.
+
+        Returns: (views, corners, 2), pixels; NaN for every other corner.
+        """
+        return np.where(self.used(name)[..., None], self.detections[name], np.nan)
+
     def rms(self, name: str) -> float | None:
         """The RMS over all corners used, as the errors of the views tell it.
 

@@ -17,6 +17,7 @@ from camviz_clinic.calibration.identifiability import undecided, undecided_by_co
 from camviz_clinic.calibration.stamp import Stamp
 from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.calibration.undecided import Undecided
+from camviz_clinic.checks.between_views import Partings
 from camviz_clinic.checks.doctor.shown import Shown
 from camviz_clinic.checks.observed import Observed
 from camviz_clinic.checks.rig import StereoPair, board_poses, pairs
@@ -75,6 +76,10 @@ class Evidence:
     def held_out(self, name: str) -> HeldOut:
         """A camera's corners held out of their view's pose, at the file's numbers."""
         return self.once(("held out", name), lambda: held_out(self.adjustment(name), camera=name))
+
+    def partings(self, name: str) -> Partings:
+        """A camera's views parted in two, solved anew. Raises ValueError where a half has too few views."""
+        return self.once(("partings", name), lambda: Partings.of(self.observed[name]))
 
     def counterparts(self) -> Iterator[tuple[str, Camera, Camera]]:
         """As `matched`, without cameras that share their pixels and lens with one before."""

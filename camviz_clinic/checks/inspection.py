@@ -13,6 +13,7 @@ from camviz.cameras import Camera
 from camviz_clinic.calibration.stamp import Stamp
 from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.checks import words
+from camviz_clinic.checks.accuracy import UNREAD, Accuracy
 from camviz_clinic.checks.camera_difference import CameraDifference, differences
 from camviz_clinic.checks.causes import by_causes
 from camviz_clinic.checks.doctor import Shown
@@ -130,6 +131,7 @@ class Inspection:
             **({"differences": [asdict(each) for each in self.differences]} if self.compare else {}),
             "cameras": [self._camera(name, camera) for name, camera in cameras.items()],
             **self._board_warp(),
+            "accuracy": list(self.summary.accuracy.values) if self.summary else [],
             "task": [asdict(each) for each in self.summary.task] if self.summary else [],
             "findings": [words.tree(finding) for finding in self.findings],
             "checked": list(self.checked),
@@ -171,8 +173,18 @@ class Inspection:
 
     @property
     def verdict(self) -> str:
-        """One sentence: the most likely cause and what to do now; or nothing wrong was found, by how many checks."""
-        return words.verdict(self.findings, self.checked, self.skipped, self.ignored)
+        """The most likely cause and what to do now; or what the calibration is good for, and by how many checks."""
+        return words.verdict(self.findings, self.checked, self.skipped, self.ignored, self._accuracy)
+
+    @property
+    def sufficient(self) -> bool:
+        """True where nothing worse than a note was found, and no accuracy is known to be useless."""
+        return self.healthy and self._accuracy.sufficient is not False
+
+    @property
+    def _accuracy(self) -> Accuracy:
+        """What it is good for, where there is no finding that comes first."""
+        return self.summary.accuracy if self.healthy and self.summary else UNREAD
 
     @property
     def next_step(self) -> str:
@@ -184,8 +196,10 @@ class Inspection:
 
         Returns: Several lines.
         """
-        glance = tuple(self.summary.lines()) if self.summary else ()
-        said = words.text(self.findings, self.checked, self.skipped, self.next_step, glance, self.ignored)
+        glance = tuple(self.summary.lines(below_verdict=self.healthy)) if self.summary else ()
+        said = words.text(
+            self.findings, self.checked, self.skipped, self.next_step, glance, self.ignored, self._accuracy
+        )
         return "".join(f"{each.sentence}\n" for each in self.differences) + "\n" * bool(self.differences) + said
 
     def __str__(self) -> str:

@@ -16,9 +16,10 @@ from camviz_clinic.calibration.enumeration import enumerated
 from camviz_clinic.calibration.guidance import instruction, next_board_poses
 from camviz_clinic.calibration.types import Calibration
 from camviz_clinic.calibration.uncertainty import largest_expected_error, projection_uncertainty
+from camviz_clinic.checks.accuracy import MAX_DIRECTION_SIGMA_PX, Accuracy, accuracy
 from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.stamps import holds_for
-from camviz_clinic.checks.task import TaskError, task_errors
+from camviz_clinic.checks.task import TaskError, image_corners, task_errors
 
 GOOD = 1.0  # pixels: where the largest expected error is below this, no more pictures are asked for (AprilCal's limit)
 UNKNOWN = "not in the file"
@@ -108,9 +109,8 @@ class Summary:
         return {name: self._uncertainty(name) for name in self.names}
 
     def _uncertainty(self, name: str) -> tuple[float, float] | None:
-        k = self.calibration.cameras[name].intrinsics
-        right, bottom = k.width - 1, k.height - 1
-        pixels = [(right / 2, bottom / 2), (0, 0), (right, 0), (0, bottom), (right, bottom)]
+        corners_uv = image_corners(self.calibration.cameras[name].intrinsics)
+        pixels = np.vstack([corners_uv.mean(axis=0), corners_uv])
         try:
             middle, *corners = projection_uncertainty(self.evidence.adjustment(name), pixels, camera=name)
         except (ValueError, np.linalg.LinAlgError):  # no corners or poses, or too few to solve from
@@ -121,6 +121,16 @@ class Summary:
     def task(self) -> tuple[TaskError, ...]:
         """What the first cameras, and each pair, are worth to a task."""
         return task_errors(self.evidence, self.at, self.names)
+
+    @cached_property
+    def accuracy(self) -> Accuracy:
+        """What the calibration is good for, by its least accurate camera and pair."""
+        return accuracy(self.evidence, self.task)
+
+    @property
+    def worth(self) -> tuple[str, ...]:
+        """What the task errors say beyond `accuracy`: the depths of pairs, and errors at a distance."""
+        return tuple(each.sentence for each in self.task if self.at is not None or len(each.cameras) > 1)
 
     @cached_property
     def largest_errors(self) -> dict[str, float]:
@@ -198,8 +208,11 @@ class Summary:
         said = (holds_for(self.calibration, name) for name in self.names)
         return tuple(sentence for sentence in said if sentence)
 
-    def lines(self) -> Iterator[str]:
-        """The same in a few lines: the origin, what it holds for, and each camera's RMS and uncertainty."""
+    def lines(self, below_verdict: bool = False) -> Iterator[str]:
+        """The same in a few lines: the origin, what it holds for, and each camera's RMS and uncertainty.
+
+        `below_verdict` leaves out what a verdict without findings has said.
+        """
         yield " · ".join(self.origin)
         yield from self.holds
         for name, rows in self.table().items():
@@ -209,19 +222,23 @@ class Summary:
         yield from self.withheld
         if self.bend_sentence:
             yield self.bend_sentence
-        for each in self.task:
-            yield each.sentence
+        yield from self.worth if below_verdict else (each.sentence for each in self.task)
 
     @cached_property
     def guidance(self) -> str:
-        """Whether there are enough pictures, else where to hold the board next; of the camera that is known worst."""
+        """Whether there are enough pictures, else where to hold the board next; of the camera that is known worst.
+
+        Empty where the file's corners do not tell.
+        """
         if not self.largest_errors:
-            return "Nothing needs doing that this file could tell: it lacks the corners, which camviz calibrate keeps."
+            return ""
         name = max(self.largest_errors, key=lambda each: self.largest_errors[each])
         largest, of = self.largest_errors[name], "" if len(self.names) == 1 else f" of {name}"
         longer = max(self.calibration.cameras[name].intrinsics.width, self.calibration.cameras[name].intrinsics.height)
         off = f"{largest:.2g} px off" if largest < longer else "farther off than the picture is long"
         said = f"where it is worst{of}, a far point is expected to be {off} (Max ERE)"
+        if largest <= self.goal <= MAX_DIRECTION_SIGMA_PX and self.accuracy.sufficient is False:
+            return ""  # what the accuracy asks for comes first
         if largest <= self.goal:
             return f"There are enough pictures: {said}, within the goal of {self.goal:g} px."
         try:

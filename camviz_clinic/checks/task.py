@@ -12,6 +12,7 @@ from math import inf, isfinite
 import numpy as np
 from numpy.typing import ArrayLike
 
+from camviz.cameras import Intrinsics
 from camviz.lenses.base import Array, as_points
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.jacobian import pixel_jacobian
@@ -73,10 +74,15 @@ def task_errors(evidence: Evidence, at: float | None = None, names: Iterable[str
     return tuple(each for each in found if each.values)
 
 
+def image_corners(intrinsics: Intrinsics) -> Array:
+    """The centres (4, 2) of the pixels in the corners of an image."""
+    right, bottom = intrinsics.width - 1, intrinsics.height - 1
+    return np.array([(0.0, 0.0), (right, 0), (0, bottom), (right, bottom)])
+
+
 def _of_camera(adjustment: Adjustment, name: str, at: float | None) -> TaskError:
-    k = adjustment.cameras[name].intrinsics
-    right, bottom = k.width - 1, k.height - 1
-    pixels = [(right / 2, bottom / 2), (0, 0), (right, 0), (0, bottom), (right, bottom)]
+    corners = image_corners(adjustment.cameras[name].intrinsics)
+    pixels = np.vstack([corners.mean(axis=0), corners])
 
     def middle_and_worst(distance: float) -> tuple[float, float]:
         deviations = direction_deviation(adjustment, pixels, distance, name)
@@ -86,12 +92,10 @@ def _of_camera(adjustment: Adjustment, name: str, at: float | None) -> TaskError
     if not np.isfinite(middle):
         return TaskError((name,), "", {})
     if middle > ANYWHERE_DEG:
-        return TaskError(
-            (name,), f"{name}: the direction to a far point is not known.", {"angle_centre_deg": float(middle)}
-        )
-    known = "not known in its worst corner" if worst > ANYWHERE_DEG else f"±{worst:.2g}° in its worst corner"
-    known = known if np.isfinite(worst) else "a corner of it has no ray"
-    said = f"{name}: the direction to a far point is known to ±{middle:.2g}° in the middle of the picture, {known}"
+        return TaskError((name,), f"{name}: the direction error is not known.", {"angle_centre_deg": float(middle)})
+    known = "not known in the worst corner" if worst > ANYWHERE_DEG else f"±{worst:.2g}° in the worst corner"
+    known = known if np.isfinite(worst) else "a corner has no ray"
+    said = f"{name}: direction error ±{middle:.2g}° at the centre, {known}"
     values = {"angle_centre_deg": middle, "angle_corner_deg": worst}
     if at is not None:
         here, there = at * np.array(middle_and_worst(at))

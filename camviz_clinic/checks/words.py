@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
 
+from camviz_clinic.checks.accuracy import UNREAD, Accuracy
 from camviz_clinic.checks.registry import SEVERITIES, Finding
 
 JSON_KEYS = (
@@ -49,13 +50,22 @@ def verdict(
     checked: Sequence[str],
     skipped: Sequence[tuple[str, str]],
     ignored: Sequence[Finding] = (),
+    accuracy: Accuracy = UNREAD,
 ) -> str:
-    """One sentence: the most likely cause and what to do now; or nothing wrong was found, by how many checks."""
+    """The most likely cause and what to do now; or what the calibration is good for, and by how many checks.
+
+    It says that no problem was found only where the accuracy is sufficient, or where the file does not tell it.
+    """
     worst = worst_of(findings)
     if worst is None:
         below = f", {counted(findings)} below" if findings else ""
-        beside = " beside what is ignored" * bool(ignored)
-        return f"Nothing wrong was found{beside}{below}; {len(checked)} checks ran{_lacking(skipped)}."
+        ran = f"{len(checked)} checks ran{_lacking(skipped)}."
+        if accuracy.sufficient is False:
+            return f"{accuracy.sentence} {f'{counted(findings)} below; ' * bool(findings)}{ran}"
+        found = f"No problem found{' beside what is ignored' * bool(ignored)}{below}"
+        if accuracy.sufficient:
+            return f"{accuracy.sentence} {found}; {ran}"
+        return f"{found}. {accuracy.sentence} {ran}" if accuracy.sentence else f"{found}; {ran}"
     do = worst.remedy.split(". ")[0].removesuffix(".")
     return f"Most likely {worst.causes[0]}: {do[0].lower()}{do[1:]}."
 
@@ -124,11 +134,12 @@ def text(
     then: str = "",
     glance: Sequence[str] = (),
     ignored: Sequence[Finding] = (),
+    accuracy: Accuracy = UNREAD,
 ) -> str:
     """The verdict, the findings with their advice and consequences below them, a `glance` at the calibration in lines,
     and what was checked. Where nothing is wrong the verdict is followed by what to do `then`.
     """
-    lines = [verdict(findings, checked, skipped, ignored), *([f"Next: {then}"] if then else []), ""]
+    lines = [verdict(findings, checked, skipped, ignored, accuracy), *([f"Next: {then}"] if then else []), ""]
     for cause, consequences in groups(findings):
         lines.append(f"{heading(cause)} {cause.id}: {cause.sentence}")
         lines += [f"    {label}: {said}" for label, said in advice(cause).items()]

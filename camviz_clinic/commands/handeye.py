@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from camviz_clinic.handeye import RobotPoses
     from camviz_clinic.handeye.diagnosis import PosedPictures
 
-PAINT = {"^Nothing wrong.*": "green", "^Most likely.*": "red", "^✗ fault": "red", "^! warning": "yellow"}
+PAINT = {"^.*No problem found": "green", "^Most likely.*": "red", "^✗ fault": "red", "^! warning": "yellow"}
 HANDEYE = """\
 Finds where a camera sits on a robot's hand (eye in hand), or beside the robot that holds the board (--eye-to-hand),
 from the robot's poses and a picture of the board at each of them. Every number has its standard deviation, clustered by

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from camviz_clinic.files import Board, Calibration
 
 PAINT = {
-    "^Nothing wrong was found": "green",
+    "^.*No problem found": "green",
     r"^\S+ fault\b": "red",
     r"^\S+ warning\b": "yellow",
     r"^\S+ note\b": "blue",

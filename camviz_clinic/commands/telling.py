@@ -62,4 +62,5 @@ def worth(calibration: Calibration, goal: float | None) -> list[str]:
     from camviz_clinic.checks.summary import GOOD, Summary
 
     summary = Summary.of(calibration, goal=goal or GOOD)
-    return [*(each.sentence for each in summary.task), summary.guidance]
+    said = [summary.accuracy.sentence, *summary.worth, summary.guidance]
+    return [sentence for sentence in said if sentence]

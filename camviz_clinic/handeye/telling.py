@@ -10,10 +10,13 @@ from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.motions import Mask
 from camviz_clinic.checks import words
+from camviz_clinic.checks.accuracy import UNREAD, Accuracy, two_digits
+from camviz_clinic.checks.task import length
 from camviz_clinic.files.output import as_rows
 from camviz_clinic.handeye.diagnosis import PosedPictures
 from camviz_clinic.handeye.solving import HandEye
 
+MAX_PLACE_SIGMA = 0.01  # of the distance to the board, and radians: above it `robot-disagrees` warns of a pose
 ARRANGEMENTS = ("eye in hand", "eye to hand")
 
 
@@ -21,7 +24,20 @@ def as_text(case: PosedPictures, skipped_pictures: tuple[tuple[str, str], ...] =
     """The verdict, the findings with what to do, X with its ±, and what was assumed."""
     lines = [*(f"{name}: skipped, {why}." for name, why in skipped_pictures), *case.poses.assumed]
     glance = [*(solution(case) if case.usable else []), *lines]
-    return words.text(case.findings, case.checked, case.skipped, glance=glance)
+    return words.text(case.findings, case.checked, case.skipped, glance=glance, accuracy=_accuracy(case))
+
+
+def _accuracy(case: PosedPictures) -> Accuracy:
+    """What X is good for, by its largest σ; nothing where findings come first."""
+    if words.worst_of(case.findings):
+        return UNREAD
+    found = case.result
+    place, turn = float(np.max(found.translation_sigma)), float(np.max(found.rotation_sigma))
+    board = float(np.median(np.linalg.norm(case.cam_from_board.translation, axis=-1)))
+    known = f"±{length(place)} and ±{two_digits(np.degrees(turn))}° on each axis"
+    if max(place / board, turn) <= MAX_PLACE_SIGMA:
+        return Accuracy(f"Good to {known}.", True)
+    return Accuracy(f"Not good for measuring: {known}. Add poses that turn the hand by 30° and more.", False)
 
 
 def solution(case: PosedPictures) -> list[str]:
@@ -42,7 +58,7 @@ def solution(case: PosedPictures) -> list[str]:
 def as_tree(case: PosedPictures) -> dict[str, Any]:
     """The verdict, the findings and the solution, for programs; null where something is not known."""
     return {
-        "verdict": words.verdict(case.findings, case.checked, case.skipped),
+        "verdict": words.verdict(case.findings, case.checked, case.skipped, accuracy=_accuracy(case)),
         "usable": case.usable,
         "findings": [words.tree(each) for each in case.findings],
         "checked": list(case.checked),

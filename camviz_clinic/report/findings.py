@@ -17,13 +17,13 @@ _HEALTHY = "#00785a"
 
 def verdict_html(inspection: Inspection) -> str:
     """The likely cause and what to do in one line, what shows it in another, and the calibration at a glance."""
-    return said_html(inspection) + (glance_html(inspection.summary) if inspection.summary else "")
+    return said_html(inspection) + (glance_html(inspection.summary, inspection.healthy) if inspection.summary else "")
 
 
 def said_html(inspection: Inspection) -> str:
     """The likely cause and what to do in one line, and what shows it in another."""
     worst = words.worst_of(inspection.findings)
-    colour = _COLOURS[worst.severity] if worst else _HEALTHY
+    colour = _COLOURS[worst.severity] if worst else _HEALTHY if inspection.sufficient else _COLOURS["warning"]
     said = f'<p class="verdict" style="border-left:5px solid {colour};padding-left:.9em">'
     said += f"<strong>{escape(inspection.verdict)}</strong>"
     said += f"<br>{escape(words.claim(inspection.findings))}" if worst else ""
@@ -32,8 +32,11 @@ def said_html(inspection: Inspection) -> str:
     return f"{compared}{said}</p>"
 
 
-def glance_html(summary: Summary) -> str:
-    """Where a calibration comes from, its numbers with their ± σ in a table, and the file's notes."""
+def glance_html(summary: Summary, below_verdict: bool = False) -> str:
+    """Where a calibration comes from, its numbers with their ± σ in a table, and the file's notes.
+
+    `below_verdict` leaves out what a verdict without findings has said.
+    """
     table = summary.table()
     rows = list(dict.fromkeys(row for column in table.values() for row in column))
     cell = 'style="text-align:left;padding:.1em 1.2em .1em 0"'
@@ -46,7 +49,8 @@ def glance_html(summary: Summary) -> str:
     )
     more = len(summary.evidence.cameras) - len(table)
     few = f"<p>The first {len(table)} of {len(table) + more} cameras.</p>" if more else ""
-    task = "".join(f"<p>{escape(each.sentence)}</p>" for each in summary.task)
+    sentences = summary.worth if below_verdict else (each.sentence for each in summary.task)
+    task = "".join(f"<p>{escape(sentence)}</p>" for sentence in sentences)
     holds = "".join(f"<p>{escape(sentence)}</p>" for sentence in summary.holds)
     said = (*summary.withheld, *summary.calibration.notes)
     notes = "".join(f'<p class="note">{escape(note)}</p>' for note in said)

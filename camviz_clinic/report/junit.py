@@ -30,6 +30,8 @@ def junit(outcomes: Mapping[str, Outcome | Audit | str]) -> str:
         cases = list(_all_cases(outcome))
         for case in cases:
             _add(suite, file, case)
+        if isinstance(outcome, Outcome):
+            ElementTree.SubElement(suite, "system-out").text = _clean(outcome.inspection.verdict)
         _count(suite, [kind for _, kind, _, _ in cases])
     for key in ("tests", "failures", "errors"):
         root.set(key, str(sum(int(suite.get(key, "0")) for suite in root)))

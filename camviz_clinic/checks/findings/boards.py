@@ -44,8 +44,9 @@ def low_coverage(evidence: Evidence) -> Iterator[Finding]:
     """The check lays the outlines of the board in all views over the image."""
     if not evidence.calibration.detections:
         raise NotChecked("the file holds no detected corners of a known board")
-    for name, pixels in evidence.calibration.detections.items():
-        share = coverage(pixels, evidence.calibration.cameras[name])
+    calibration = evidence.calibration
+    for name, pixels in calibration.detections.items():
+        share = coverage(calibration.used_pixels(name), calibration.cameras[name])
         if share < COVERED:
             sentence = f"{name}: the board was seen in {share:.0%} of the image, over {len(pixels)} views."
             yield low_coverage.found(sentence, share, "of the image", name)
@@ -56,28 +57,43 @@ def coverage(pixels: Array, camera: Camera) -> float:
 
     Beyond a fisheye's circle only the cells count in which corners were seen all the same.
     """
+    covered = covered_cells(pixels, camera)
+    return float(covered.mean() / np.mean(within_reach(camera) | covered))
+
+
+def cell_centres(camera: Camera) -> Array:
+    """The pixels (rows, columns, 2) in the middle of the cells of an image, `CELLS` of them along its longer side."""
     grid = camera.intrinsics
     scale = CELLS / max(grid.width, grid.height)
-    cells = np.zeros((max(1, round(grid.height * scale)), max(1, round(grid.width * scale))), np.uint8)
+    columns, rows = max(1, round(grid.width * scale)), max(1, round(grid.height * scale))
+    u = (np.arange(columns) + 0.5) * grid.width / columns - 0.5
+    v = (np.arange(rows) + 0.5) * grid.height / rows - 0.5
+    return np.stack(np.meshgrid(u, v), axis=-1)
+
+
+def covered_cells(pixels: Array, camera: Camera) -> NDArray[np.bool_]:
+    """Mask (rows, columns) of the cells whose centres lie inside the convex outline of some view's corners."""
+    centres = cell_centres(camera)
+    covered = np.zeros(centres.shape[:2], bool)
     for view in pixels:
         seen = view[np.isfinite(view).all(axis=-1)]
         if len(seen) > 2:
-            outline = cv2.convexHull(np.round((seen + 0.5) * scale * 16 - 8).astype(np.int32))
-            cv2.fillConvexPoly(cells, outline, 1, shift=4)
-    return float(cells.mean() / np.mean(within_reach(camera, *cells.shape) | (cells > 0)))
+            outline = cv2.convexHull(seen.astype(np.float32))[:, 0].astype(float)
+            along, away = np.roll(outline, -1, axis=0) - outline, centres[..., None, :] - outline
+            side = along[:, 0] * away[..., 1] - along[:, 1] * away[..., 0]
+            covered |= (side >= 0).all(axis=-1) | (side <= 0).all(axis=-1)
+    return covered
 
 
-def within_reach(camera: Camera, rows: int, columns: int) -> NDArray[np.bool_]:
-    """In which of rows × columns cells of its image a camera can see something: false beyond a fisheye's circle.
+def within_reach(camera: Camera) -> NDArray[np.bool_]:
+    """In which cells (rows, columns) of its image a camera can see something: false beyond a fisheye's circle.
 
     A fold or a pole nearer than that takes no cell away: missing views lead to it, and must not hide behind it.
     """
-    grid, lens = camera.intrinsics, camera.lens
+    lens, centres = camera.lens, cell_centres(camera)
     if lens.goes_round:
-        return np.ones((rows, columns), bool)
-    u = (np.arange(columns) + 0.5) * grid.width / columns - 0.5
-    v = (np.arange(rows) + 0.5) * grid.height / rows - 0.5
-    z = lens.unproject(grid.from_pixels(np.stack(np.meshgrid(u, v), axis=-1)))[..., 2]
+        return np.ones(centres.shape[:2], bool)
+    z = lens.unproject(camera.intrinsics.from_pixels(centres))[..., 2]
     turns_back = bool(lens.denominator_terms) or fold_angle(lens) < WIDEST
     return np.where(np.isfinite(z), z >= cos(WIDEST), turns_back)
 

@@ -174,7 +174,7 @@ def split_disagreement(evidence: Evidence) -> Iterator[Finding]:
     found, apart = list[Finding](), list[str]()
     for observed in enough:
         try:
-            found += list(_drift(observed)) or list(_disagreement(observed))
+            found += list(_drift(observed)) or list(_disagreement(observed, evidence.partings(observed.name)))
         except NothingSharedError:
             apart.append(observed.name)
     if apart and not found:
@@ -192,8 +192,7 @@ def _drift(observed: Observed) -> Iterator[Finding]:
         yield split_disagreement.found(sentence, drift.share * 100, "%", observed.name)
 
 
-def _disagreement(observed: Observed) -> Iterator[Finding]:
-    partings = Partings.of(observed)
+def _disagreement(observed: Observed, partings: Partings) -> Iterator[Finding]:
     in_time, by_turns = partings.in_time.apart, partings.by_turns.apart
     if certain := partings.certain:
         most = max(certain, key=lambda each: each.apart)
