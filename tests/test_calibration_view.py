@@ -347,8 +347,8 @@ def test_the_first_picture_is_the_garden_with_the_board_in_its_place():
     view = CalibrationView(panels="picture fit", noise=0.0)
     assert "garden" in view.figure().photographs
     panel = view._image_panel
-    drawn = re.findall(r"M([\d.-]+),([\d.-]+)", held_board(panel, view.board, view.cam_from_board[0], TRUTH))
-    starts = np.array(drawn, dtype=float)
+    board = held_board(panel, view.board, view.cam_from_board[0], TRUTH)
+    starts = np.array([line[0] for mark in board.of("plain") for line in mark.lines])
     inner = panel.place(view.corners[0])
     near = np.linalg.norm(starts[:, None] - inner, axis=-1).min(axis=0)
     assert np.sum(near < 0.1) >= 20  # every other corner begins a dark square

@@ -38,8 +38,6 @@ from camviz_clinic.views.rig import RigView
 from camviz_clinic.views.uncertainty import UncertaintyRangeView, UncertaintyView
 from camviz_clinic.views.undistorted import UndistortedView
 
-PAIR = re.compile(r"M([-\d.]+),([-\d.]+)L([-\d.]+),([-\d.]+)")
-
 
 def observed(calibration) -> Observations:
     return Observations.of(calibration)
@@ -51,10 +49,9 @@ def perfect(corners=BOARD.corners, noise: float = 0.0, views: int = 12) -> Obser
     return Observations(TRUE, BOARD, seen(TRUE, held, corners, noise), held)
 
 
-def drawn(picture, class_: str) -> np.ndarray:
-    """The straight segments (n, 4) of all paths of a class."""
-    data = [d for d, c in re.findall(r'<path d="([^"]*)" class="([^"]*)"', picture) if c == class_]
-    return np.array([list(map(float, found)) for d in data for found in PAIR.findall(d)])
+def drawn(marks, class_: str) -> np.ndarray:
+    """The straight segments (n, 4) of all marks of exactly this class."""
+    return np.concatenate([mark.ends.reshape(-1, 4) for mark in marks.of(class_) if mark.class_ == class_])
 
 
 # Residuals -----------------------------------------------------------------------------------------------------------
@@ -87,12 +84,13 @@ def test_the_number_at_a_bar_is_its_height_with_and_without_the_corners_set_asid
     assert seen.rms_seen[6] > 2 * seen.rms[6]
     assert pale[6] == pytest.approx(seen.rms_seen[6], rel=0.01)
     assert solid[6] == pytest.approx(seen.rms[6], rel=0.01)
-    written = re.findall(r'<text x="([\d.]+)" y="[\d.]+" class="tick middle(?: halo clear)?"[^>]*>(\d\.\d\d)<', drawn)
-    at = [(round(panel.data((float(x), 0))[0]) - 1, float(number)) for x, number in written]
+    written = [text for text in drawn.of("tick middle") if re.fullmatch(r"\d\.\d\d", text.words)]
+    at = [(round(panel.data((text.x, 0))[0]) - 1, float(text.words)) for text in written]
     ends = [(i, value) for tops in (solid, pale) for i, value in enumerate(tops) if np.isfinite(value)]
     assert sorted(at) == [(i, pytest.approx(value, abs=0.006)) for i, value in sorted(ends)]
-    assert "RMS [px]" in drawn
-    assert "blue: corners used, pale red: with those set aside" in drawn
+    words = [text.words for text in drawn.texts()]
+    assert "RMS [px]" in words
+    assert any("blue: corners used, pale red: with those set aside" in one for one in words)
 
 
 def test_a_rejected_board_leaves_the_axis_to_the_other_bars():
@@ -105,18 +103,19 @@ def test_a_rejected_board_leaves_the_axis_to_the_other_bars():
     drawn = view.bars_panel(panel)
     tops = heights(panel, drawn, "fill-blue|fill-orange")
     assert np.nanmax(tops) > 0.8 * panel.top
-    assert f">{view.observations.rms_seen[8]:.2f}<" in drawn
-    assert drawn.count("paper-line cut") == 1
-    assert "broken: cut" in drawn
+    words = [text.words for text in drawn.texts()]
+    assert f"{view.observations.rms_seen[8]:.2f}" in words
+    assert len(drawn.of("paper-line cut")) == 1
+    assert any("broken: cut" in one for one in words)
 
 
-def heights(panel, picture, classes):
+def heights(panel, marks, classes):
     """The upper ends (10,) of the bars of some classes, in the panel's own unit; NaN where there is no bar."""
     tops = np.full(10, np.nan)
-    for data in re.findall(rf'<path d="([^"]*)" class="(?:{classes})"', picture):
-        for corners in re.findall(r"M([^Z]*)Z", data):
-            places = panel.data(np.array([list(map(float, p.split(","))) for p in corners.split()]))
-            tops[round(places[:, 0].mean()) - 1] = places[:, 1].max()
+    bars = [mark for class_ in classes.split("|") for mark in marks.of(class_) if mark.class_ == class_]
+    for corners in (line for bar in bars for line in bar.lines):
+        places = panel.data(corners)
+        tops[round(places[:, 0].mean()) - 1] = places[:, 1].max()
     return tops
 
 
@@ -133,7 +132,7 @@ def test_an_arrow_leads_from_a_corner_towards_its_projection_at_the_stated_scale
     projected = cv2.projectPoints(BOARD.corners, rvec, t, view.observations.camera.intrinsics.K, D)[0].reshape(-1, 2)
     ends = detected + scale * (projected - detected)
     np.testing.assert_allclose(shafts, np.hstack([panel.place(detected), panel.place(ends)]), atol=0.06)
-    assert f"residuals × {scale:g}" in body
+    assert any(f"residuals × {scale:g}" in text.words for text in body.texts())
 
 
 def test_corners_set_aside_have_crosses_and_no_say():

@@ -38,8 +38,8 @@ def test_the_chart_is_as_far_from_the_truth_as_colour_science_says():
 
 def test_what_the_picture_says_is_on_the_patches():
     view = ColourView()
-    written = re.findall(r'class="tick" style="fill:#\w+">([\d.]+)</text>', view.figure(draft=True).svg())
-    assert written == [f"{error:.1f}" for error in view.errors]
+    (chart,) = (tile for tile in view.figure(draft=True).tiles if tile.name == "chart")
+    assert [text.words for text in chart.marks.of("tick")] == [f"{error:.1f}" for error in view.errors]
 
 
 def test_without_balance_nothing_is_multiplied_and_balance_makes_its_patch_grey():
@@ -238,8 +238,8 @@ def test_where_a_function_is_awaited_the_right_pictures_stand_greyed(part):
     )
     assert right.shape == greyed.shape
     assert np.ptp(greyed.astype(int), axis=-1).mean() < 3 < np.ptp(right.astype(int), axis=-1).mean()
-    tiles = {tile.name: tile.body for tile in figure.tiles}
-    distances = {name: len(re.findall(r'class="tick" style="fill', tiles[name])) for name in ("chart", "your chart")}
+    tiles = {tile.name: tile.marks for tile in figure.tiles}
+    distances = {name: len(tiles[name].of("tick")) for name in ("chart", "your chart")}
     assert distances == {"chart": 24, "your chart": 0}  # not the right ones, pale
 
 

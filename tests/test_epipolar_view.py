@@ -237,11 +237,11 @@ def test_panels_are_left_out_and_others_refused():
 def test_the_left_picture_alone_has_no_line_and_nothing_of_the_other_camera():
     """Its first view: where the point flies is to be seen, and not what the right picture will show."""
     alone = EpipolarView(panels="space")
-    parts = {tile.name: tile.body for tile in alone.figure(draft=True).tiles}
+    parts = {tile.name: tile.marks for tile in alone.figure(draft=True).tiles}
     assert list(parts) == ["left picture", "space"]
-    assert 'class="green' not in parts["left picture"]
-    assert "orange" not in parts["space"]
-    assert 'class="green' in EpipolarView(panels="right").figure(draft=True).tiles[0].body
+    assert not parts["left picture"].of("green")
+    assert not parts["space"].of("orange")
+    assert EpipolarView(panels="right").figure(draft=True).tiles[0].marks.of("green")
     assert "= 0" not in alone.description()
     assert "0.700 m" not in alone.description()
 

@@ -13,6 +13,7 @@ import pytest
 from ipywidgets import HTML, FloatSlider, HBox, Tab, VBox, interactive_output, jslink
 from traitlets import TraitError, link
 
+from camviz.draw import svg
 from camviz.draw.picture import Picture
 from camviz.views.base import View, choice, slider, switch
 from camviz.views.frustum import FrustumView
@@ -34,7 +35,7 @@ class Toy(View):
     def figure(self, *, draft: bool = False) -> Picture:
         if self.size > 5:
             raise ValueError("size must be at most 5")
-        return Picture.whole(f"<!--{self} {draft}-->", 10, 10, "Toy", f"size {self.size:g}")
+        return Picture.whole(svg.text((0, 9), f"{self} {draft}"), 10, 10, "Toy", f"size {self.size:g}")
 
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
         return self.but(x=self.x + dx)
@@ -45,7 +46,7 @@ class Large(Toy):
     """A view that draws every size, and whose size is dragged."""
 
     def figure(self, *, draft: bool = False) -> Picture:
-        return Picture.whole("", 10, 10, "Large", f"size {self.size:g}")
+        return Picture.whole(svg.NOTHING, 10, 10, "Large", f"size {self.size:g}")
 
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
         return self.but(size=self.size + dx)
@@ -453,7 +454,7 @@ class Shelf(Toy):
     def figure(self, *, draft: bool = False) -> Picture:
         if self.size > 5:
             raise ValueError("size must be at most 5")
-        return Picture.whole(self.panels, 10, 10, "Shelf", self.panels)
+        return Picture.whole(svg.text((0, 9), self.panels), 10, 10, "Shelf", self.panels)
 
 
 def test_a_panel_is_opened_and_closed_from_the_page_and_stays_open_when_the_controls_are_reset():
@@ -503,10 +504,10 @@ class Drawn(Toy):
     def figure(self, *, draft: bool = False) -> Picture:
         made = self.yours(self.size)
         if made is None:
-            return Picture.whole("", 10, 10, "Drawn", "waits")
+            return Picture.whole(svg.NOTHING, 10, 10, "Drawn", "waits")
         if made > 50:
             raise ValueError("size must be smaller")
-        return Picture.whole("", 10, 10, "Drawn", f"{made:g}")
+        return Picture.whole(svg.NOTHING, 10, 10, "Drawn", f"{made:g}")
 
 
 def double(size): ...

@@ -201,8 +201,8 @@ def test_a_telephone_shows_the_whole_curve_and_all_names_of_its_lines():
     view = PhotonTransferView(panels="curve", yours=lambda electrons, *_: electrons)
     curve, key = view.figure(draft=True).tiles
     assert max(curve.cell[2], key.cell[2]) <= SCROLLED
-    assert key.body.count("<text") == 8
-    assert max(map(float, re.findall(r'<text[^>]* y="([\d.]+)"', key.body))) + 34 < key.cell[3]
+    assert len(key.marks.texts()) == 8
+    assert max(text.y for text in key.marks.texts()) + 34 < key.cell[3]
 
 
 def test_a_full_card_is_called_full():

@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 import traitlets
 
+from camviz.draw import svg
+from camviz.draw.marks import Image, Marks
 from camviz.draw.picture import Picture, jpeg
 from camviz.views.base import View, choice, slider, switch
 from camviz.views.distortion import DistortionView
@@ -41,8 +43,8 @@ class Toy(View):
         if self.size > 8:
             raise ValueError("size must be at most 8")
         words = f"size {self.size:g}, height {self.height:g}, {self.colour}, {self.lit}"
-        body = '<rect x="0" y="0" width="300" height="200" data-drag="size"/><image href="attached:photo"/>'
-        body += f'<text x="5" y="20" class="label">{words}</text><text x="5" y="38">below</text>'
+        body = svg.handle(svg.rectangle(0, 0, 300, 200, "card"), "size", "size") + svg.image("photo", 0, 0, 8, 8)
+        body += svg.text((5, 20), words) + svg.text((5, 38), "below", "")
         photo = jpeg(np.full((8, 8, 3), int(20 * self.size), np.uint8))
         return Picture.whole(body, 300, 200, "Toy", words, {"photo": photo})
 
@@ -162,13 +164,18 @@ def test_recording_again_gives_the_same_files(tmp_path):
     assert made[0].files == made[1].files
 
 
+def noise(rng: np.random.Generator, size: int) -> svg.Marks:
+    """Words of so many random bytes, which cannot be compressed."""
+    return Marks([Image(rng.bytes(size).hex(), 0, 0, 1, 1)])
+
+
 @dataclass(frozen=True)
 class Noisy(Toy):
     """A view that cannot be compressed."""
 
     def figure(self, *, draft: bool = False) -> Picture:
         rng = np.random.default_rng(int(1000 * self.height) + 17)
-        return Picture.whole(f"<path d='{rng.bytes(20_000).hex()}'/>", 10, 10, "Noisy", f"height {self.height:g}")
+        return Picture.whole(noise(rng, 20_000), 10, 10, "Noisy", f"height {self.height:g}")
 
 
 def test_positions_are_thinned_until_the_size_holds(tmp_path):
@@ -184,8 +191,8 @@ class Heavy(Toy):
     """A view that has the most in common between its positions, and it cannot be compressed."""
 
     def figure(self, *, draft: bool = False) -> Picture:
-        common = np.random.default_rng(17).bytes(20_000).hex()
-        drawn = f"<path d='{common}'/><circle r='{self.height:g}'/>"
+        common = np.random.default_rng(17)
+        drawn = noise(common, 20_000) + svg.rectangle(0, 0, self.height, 1, "card")
         return Picture.whole(drawn, 10, 10, "Heavy", f"height {self.height:g}")
 
 
@@ -198,7 +205,7 @@ class Steep(Toy):
     def figure(self, *, draft: bool = False) -> Picture:
         self.drawn.append(self.height)
         rng = np.random.default_rng(int(1000 * self.height) if self.height % 0.5 else 17)
-        return Picture.whole(f"<path d='{rng.bytes(9_000).hex()}'/>", 10, 10, "Steep", f"height {self.height:g}")
+        return Picture.whole(noise(rng, 9_000), 10, 10, "Steep", f"height {self.height:g}")
 
 
 def test_no_share_is_drawn_that_what_was_too_large_foretells_to_be_too_large(tmp_path):

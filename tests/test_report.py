@@ -110,7 +110,7 @@ def test_findings_come_first_with_their_words(page):
 def test_the_bars_pictures_and_boards_of_a_view_share_its_number():
     text = reported("sick")
     bars = set(re.findall(r'<a href="#of-camera-\d+" data-choose="(\d+)" aria-label', text))
-    boards = set(re.findall(r'data-choose="(\d+)" class="board"', text))
+    boards = set(re.findall(r'class="board" href="#of-camera-\d+" data-choose="(\d+)"', text))
     figures = set(re.findall(r'<figure id="of-camera-\d+" data-view="(\d+)"', text))
     assert bars == boards == figures == {str(i + 1) for i in range(10)}
     assert 'data-first="4"' in text

@@ -1,7 +1,6 @@
 """The vanishing-point and the height visualizer: what they draw is what the house and its camera are."""
 
 import math
-import re
 from itertools import combinations
 
 import numpy as np
@@ -44,10 +43,10 @@ def test_a_dragged_end_moves_its_own_line_and_no_other(handle, moves):
 @pytest.mark.parametrize("aside", [-3.0, 0.0, 2.0])
 @pytest.mark.parametrize("turn_deg", [-25.0, 0.0, 30.0])
 def test_a_hand_can_take_each_end_although_two_lines_end_in_the_corner_of_both_walls(turn_deg, aside):
-    body = VanishingView(turn_deg=turn_deg, aside=aside).figure(draft=True).body
-    hands = re.findall(r'<g data-drag="end\d".*?<circle cx="([\d.-]+)" cy="([\d.-]+)" r="13"', body)
+    marks = VanishingView(turn_deg=turn_deg, aside=aside).figure(draft=True).marks
+    hands = [group.marks.points("card").mean(axis=0) for group in marks.groups("end")]
     assert len(hands) in (4, 8)
-    between = [math.dist(map(float, a), map(float, b)) for a, b in combinations(hands, 2)]
+    between = [math.dist(a, b) for a, b in combinations(hands, 2)]
     assert min(between) > 8  # of 13 that each reaches
 
 

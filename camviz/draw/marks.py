@@ -173,6 +173,11 @@ class Marks(tuple[Mark, ...]):
         lines = [line for mark in self.of(class_) for line in _lines_of(mark)]
         return np.concatenate([*lines, np.empty((0, 2))])
 
+    def groups(self, handle: str) -> list[Group]:
+        """The groups that a pointer drags, whose handle begins so."""
+        groups = (mark for mark in self.walk() if isinstance(mark, Group))
+        return [mark for mark in groups if str(mark.attributes.get("data_drag", "")).startswith(handle)]
+
     @property
     def handles(self) -> list[str]:
         """What a pointer can drag, by name."""
