@@ -50,7 +50,7 @@ def words(shot, room):
 def test_x_is_printed_and_kept_with_a_sigma_that_reaches_the_truth(words, shot, room, capsys):
     assert main(words()) == 0
     said = capsys.readouterr().out
-    assert said.startswith("Nothing wrong was found; 10 checks ran, 1 could not because the poses have no column")
+    assert said.startswith("Nothing wrong was found; 11 checks ran, 1 could not because the poses have no column")
     assert "9 of 9 poses used" in said
     assert said.endswith("handeye.yaml: written.\n")
     kept = yaml.safe_load((room / "handeye.yaml").read_text(encoding="utf-8"))
