@@ -45,7 +45,7 @@ CAUSES = {
     "poses-repeated": ("a pose that was read once and written again", "a controller that was read before it moved"),
     "wrong-unit": ("lengths in another unit than they were read in",),
     "poses-inverted": ("poses of the base in the hand's frame", "the other arrangement of camera and board"),
-    "poses-shifted": ("a picture or a row that is missing at the start",),
+    "poses-shifted": ("a picture or a row that is missing",),
     "poses-reordered": ("pictures sorted otherwise than the poses",),
     "poses-misread": ("another convention of rotations than was assumed",),
     "time-offset": ("clocks of robot and camera that differ", "a robot that moved while pictures were taken"),
@@ -142,7 +142,7 @@ class PosedPictures:
 
     @cached_property
     def findings(self) -> tuple[Finding, ...]:
-        """What is wrong, the worst first. Where poses are stale or another reading mends it, nothing but that is told."""
+        """What is wrong, the worst first; nothing but that where poses are stale or another reading mends it."""
         stale = tuple(self._repeated())
         if any(each.severity == "fault" for each in stale):
             return stale
@@ -217,7 +217,7 @@ class PosedPictures:
         repeats = sum(len(group) - 1 for group, _ in stale)
         robot, boards = self._turned_deg
         if len(groups) == 1:
-            sentence = f"All {count} robot poses are the same; {BOARD_MOVED} {_length(moved[0])}."
+            sentence = f"All {self._alike_rows} robot poses are the same; {BOARD_MOVED} {_length(moved[0])}."
         elif len(groups) < FEWEST:
             sentence = f"The {count} rows hold only {len(groups)} different robot poses; at least {FEWEST} are needed."
         elif robot < SAME_POSE_DEG and boards > STILL_BOARD_DEG:
@@ -242,6 +242,13 @@ class PosedPictures:
             remedy="Read the robot's pose anew when it has come to rest at each picture, or leave these rows out.",
             pictures=tuple(int(self.seen[i]) for group, _ in stale for i in group),
         )
+
+    @property
+    def _alike_rows(self) -> int:
+        """How many rows of the table, with a board in their picture or without, have the pose of the first seen."""
+        rows = self.poses.base_from_hand
+        first = _first_alike(rows)
+        return int((first == first[self.seen[0]]).sum())
 
     @property
     def _board_motion(self) -> float:

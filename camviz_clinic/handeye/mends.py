@@ -228,8 +228,8 @@ def row_shifts(rows: RigidTransform, places: Indices, boards: RigidTransform) ->
     """By how many rows the pose of each picture lies beyond its place, where that makes more pictures agree.
 
     The angle between two poses of the hand is that between the boards of their pictures (`Motions.angle_mismatch`).
-    First those shifts are sought with which most pictures agree with one of them, tried for each as that one; then those
-    with which most pictures agree with half of these or more.
+    First those shifts are sought with which most pictures agree with one of them, tried for each as that one. Then
+    those are sought with which most pictures agree with more than half of these.
 
     Args:
         rows: The robot's poses.
@@ -262,7 +262,7 @@ def _count(supported: Array, path: Indices) -> int:
 
 
 def _supported(agree: Array, path: Indices) -> Array:
-    """Whether a picture under a shift (pictures, shifts) agrees with half of those or more that agree on this path."""
+    """Whether pictures under shifts (pictures, shifts) agree with more than half of those that agree on this path."""
     own = np.arange(len(path))
     mutual = agree[own[:, None], path[:, None], own, path]
     members = mutual[mutual.sum(axis=1).argmax()]
@@ -294,12 +294,12 @@ def shift_words(shifts: Indices, places: Indices, named: Callable[[int], str]) -
     """What is the case with shifts (pictures,) of rows, as the rest of a sentence; and what to do."""
     starts = [0, *(np.flatnonzero(np.diff(shifts)) + 1)]
     parts = []
-    for start in starts:
-        by = abs(int(shifts[start]))
-        way = "down" if shifts[start] > 0 else "up"
+    for begin in starts:
+        by = abs(int(shifts[begin]))
+        way = "down" if shifts[begin] > 0 else "up"
         pose = f"the pose {by} row{'s' * (by > 1)} further {way}" if by else "the pose of its own row"
-        if start:
-            parts.append(f"from {named(int(places[start]))} on each picture belongs to {pose}")
+        if begin:
+            parts.append(f"from {named(int(places[begin]))} on each picture belongs to {pose}")
         elif by:
             parts.append(f"each picture belongs to {pose}")
     changes = np.diff(shifts, prepend=0)[starts]

@@ -42,8 +42,8 @@ NEARLY_SIDEWAYS = cos(radians(85))  # beyond, a ray has no point on the plane z 
     symptom="The border mirrors or folds back after undistortion.",
     causes=("a distortion polynomial that turns back inside the image", "no corners near the border in the fit"),
     remedy="Take fewer terms and solve again with more views that reach the border.",
-    threshold="Any such pixel lies on the border. It is a note where less than 1 % of the pixels are lost, or up to "
-    "10 % beyond the last corner of the board, and for a fisheye beyond 90°, whose picture may end before.",
+    threshold="Any such pixel lies on the border. It is a note where less than 1 % of the pixels are lost, and up to "
+    "10 % beyond the last corner of the board. So it is for a fisheye beyond 90°, whose picture may end before.",
     explains=("inverse-not-converged", "rectified-black"),
 )
 def fold(evidence: Evidence) -> Iterator[Finding]:
