@@ -149,7 +149,7 @@ CANCELLED = BrownConrady(
     *(-2.7306773773930897, -1.217725820479524, 2.4052243546080136),
     *(-0.0020670359760441713, 3.466088079317406e-05, 0.014100351510458799, -3.093532973620761e-05),
 )
-"""A published calibration of 1440 × 1080 pixels whose N and D have roots at r = 0.5910499 and 0.5910491."""
+"""A calibration that was reported as faulty: N and D have roots at r = 0.5910499 and 0.5910491."""
 
 
 def cancelling(pole, gap, extra=0.1):
@@ -159,7 +159,7 @@ def cancelling(pole, gap, extra=0.1):
 
 
 def test_the_first_root_of_several_is_that_of_numpy():
-    """Of a cubic in r² with three positive roots, and of the published calibration."""
+    """Of a cubic in r² with three positive roots, and of the reported calibration."""
     a, b, c = 0.9, 0.35, 2.0
     D = np.polynomial.polynomial.polyfromroots([a, b, c])
     assert pole_radius(BrownConrady(*[0] * 5, *(D[1:] / D[0]))) == pytest.approx(sqrt(b), rel=1e-12)
@@ -227,7 +227,7 @@ def test_the_inverse_follows_one_branch_from_the_centre(lens):
 
 
 def test_a_cancelled_pole_has_no_rays_behind_it():
-    """Pixels (0, 0) and (10, 10) of the published calibration: by the hairline branch they would be 10 px inwards."""
+    """Pixels (0, 0) and (10, 10) of the reported calibration: by the hairline branch they would be 10 px inwards."""
     grid = Intrinsics(1440, 1080, 1570.8956145992222, 1570.3494207432338, 744.873376467274, 575.5508745633753)
     rays = CANCELLED.unproject(grid.from_pixels([[0, 0], [10, 10], [50, 50]]))
     assert np.isnan(rays[:2]).all()

@@ -488,7 +488,7 @@ distortion_coefficients: !!opencv-matrix
 
 
 def test_a_near_pole_is_named_at_the_first_zero(tmp_path, monkeypatch, capsys):
-    """Of the denominator of a published file, at 0.5910; the image ends beyond, at 0.5993. The tables say so too."""
+    """Of the denominator of a reported file, at 0.5910; the image ends beyond, at 0.5993. The tables say so too."""
     monkeypatch.chdir(tmp_path)
     Path("cancel.yml").write_text(CANCELLED_YML, encoding="utf-8")
     (found,) = inspect_file(Path("cancel.yml")).findings

@@ -12,8 +12,11 @@ from camviz_clinic.handeye.diagnosis import (
     DISAGREE,
     KINDS,
     LITTLE_DEG,
+    MIN_BOARD_MOTION,
     SAME_POSE_DEG,
     SAME_POSE_MM,
+    STILL_BOARD_DEG,
+    UNKNOWN_DEG,
     PosedPictures,
     _first_alike,
     turning_finding,
@@ -244,7 +247,7 @@ def test_stale_poses_are_named_before_anything_is_solved(monkeypatch, rows):
     assert dict(found.skipped)["poses-misread"] == "the poses must be recorded anew"
 
 
-def test_one_stale_row_is_set_aside_and_two_pictures_of_one_pose_are_no_fault():
+def test_one_stale_row_is_a_warning_and_a_pause_is_none():
     true = cell(np.random.default_rng(1), 17)
     stale = case(true, RobotPoses(true.base_from_hand[[0, 1, 2, 3, 4, 5, 6, 6, *range(8, 17)]]))
     assert [(each.id, each.severity) for each in stale.findings] == [
@@ -258,7 +261,7 @@ def test_one_stale_row_is_set_aside_and_two_pictures_of_one_pose_are_no_fault():
 
 
 @pytest.mark.parametrize(("factor", "same"), [(0.99, True), (1.01, False)])
-def test_poses_are_the_same_within_the_scatter_of_a_robot_at_rest(factor, same):
+def test_poses_within_a_robots_scatter_are_the_same(factor, same):
     apart = RigidTransform.from_components(
         [[0, 0, 0], [factor * SAME_POSE_MM / 1000, 0, 0]], Rotation.from_rotvec([[0, 0, 0], [0, 0, 0]])
     )
@@ -290,7 +293,7 @@ def test_a_shift_is_named_with_the_row_it_begins_at(to_hand, lost, rows, says):
     assert f"Look for a missing {'row' if rows else 'picture'} or surplus" in finding.remedy
 
 
-def test_a_published_shift_after_two_failed_pictures_is_found_by_angles_alone():
+def test_a_shift_after_failed_pictures_is_found_by_angles():
     """Row 11 is of picture 11, which failed, as 12 did: pictures 13 to 15 belong to the poses two rows down."""
     numbers = np.array(MIS_SHIFTED)
     A = RigidTransform.from_components(numbers[:, :3], Rotation.from_rotvec(numbers[:, 3:]))
@@ -313,9 +316,29 @@ def test_two_pictures_more_must_agree_for_a_shift(moved, found):
     assert (row_shifts(true.base_from_hand, np.arange(13), boards[kept]) is not None) == found
 
 
-def test_large_errors_of_a_robot_that_turned_are_not_called_little_turning():
+def test_large_errors_are_not_called_little_turning():
     true = cell(np.random.default_rng(8), 8)
     result = case(true).result
     noisy = replace(result, adjusted=replace(result.adjusted, noise=replace(result.noise, turn=np.radians(20))))
     finding = turning_finding(Turning(np.array([25.0, 20, 15]), np.eye(3)), noisy)
     assert (finding.id, finding.severity) == ("robot-disagrees", "fault")
+
+
+@pytest.mark.parametrize(("factor", "ids"), [(0.99, []), (1.01, ["poses-repeated"])])
+def test_a_board_has_moved_from_a_twentieth_of_its_distance(factor, ids):
+    true = cell(np.random.default_rng(1), 6)
+    found = case(true, RobotPoses(true.base_from_hand[[0, 0, 2, 3, 4, 5]]))
+    turns = Rotation.from_rotvec(np.zeros((6, 3)))
+    boards = RigidTransform.from_components([[0, 0, 1], [factor * MIN_BOARD_MOTION, 0, 1], *[[0, 0, 1]] * 4], turns)
+    found.__dict__["cam_from_board"] = boards
+    assert [each.id for each in found._repeated()] == ids
+
+
+@pytest.mark.parametrize(
+    ("robot", "boards", "still"),
+    [(0.99, 0.99, True), (1.01, 0.99, False), (0.99, 1.01, False)],
+)
+def test_hand_and_boards_are_still_below_their_limits(robot, boards, still):
+    found = case(cell(np.random.default_rng(1), 6))
+    found.__dict__["_turned_deg"] = (robot * UNKNOWN_DEG, boards * STILL_BOARD_DEG)
+    assert found._still == still
