@@ -4,6 +4,7 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.checks import Inspection, inspect, inspect_file, kinds
 from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.fields import smooth_field, warp_columns
+from camviz_clinic.checks.findings import lens as lens_findings
 from camviz_clinic.checks.findings.boards import coverage, held_out_ratio
 from camviz_clinic.checks.observed import explained, parameter_columns
 from camviz_clinic.checks.rig import fits_better
@@ -465,3 +467,47 @@ def test_corners_in_pictures_are_found_for_a_file_without_them(capsys):
     assert main([*words, "--board", "9x6", "--square-mm", "25", "--json"]) == 0
     tree = json.loads(capsys.readouterr().out)
     assert "pose-absorbs-error" in tree["checked"]
+
+
+CANCELLED_YML = """%YAML:1.0
+---
+image_width: 1440
+image_height: 1080
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [1570.8956145992222, 0.0, 744.873376467274, 0.0, 1570.3494207432338, 575.5508745633753, 0.0, 0.0, 1.0]
+distortion_coefficients: !!opencv-matrix
+   rows: 12
+   cols: 1
+   dt: d
+   data: [-2.8247717583453804, -0.8007807076436804, -0.014595359484103326, 0.0018820998949700702, 1.9827795585249783,
+      -2.7306773773930897, -1.217725820479524, 2.4052243546080136, -0.0020670359760441713, 3.466088079317406e-05,
+      0.014100351510458799, -3.093532973620761e-05]
+"""
+
+
+def test_a_near_pole_is_named_at_the_first_zero(tmp_path, monkeypatch, capsys):
+    """Of the denominator of a reported file, at 0.5910; the image ends beyond, at 0.5993. The tables say so too."""
+    monkeypatch.chdir(tmp_path)
+    Path("cancel.yml").write_text(CANCELLED_YML, encoding="utf-8")
+    (found,) = inspect_file(Path("cancel.yml")).findings
+    assert found.id == "near-pole"
+    assert "is 0, which is a pole, at r = 0.5910 focal lengths. The image reaches to 0.5993." in found.sentence
+    assert "Beyond it less than 1 % of the pixels have no ray." in found.sentence
+    assert main(["convert", "cancel.yml", "tables.npz", "--to", "lut"]) == 0
+    assert "warning: camera: 0.05 % of the pixels have no ray; `rays` is NaN there." in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("lost", "severity"), [(0.1, "note"), (0.1001, "fault")])
+def test_a_fold_of_a_tenth_of_the_image_is_a_fault(lost, severity, monkeypatch):
+    """Though no board was seen beyond it."""
+    camera = Camera(Intrinsics(640, 480, 500, 500, 320, 240), BrownConrady(k1=-3.0))
+    middle = np.tile([320.0, 240.0], (1, 54, 1))
+    monkeypatch.setattr(lens_findings, "_lost", lambda camera: lost)
+    evidence = SimpleNamespace(
+        cameras={"camera": camera}, calibration=SimpleNamespace(detections={"camera": middle}), observed={}
+    )
+    (found,) = lens_findings.fold.check(evidence)
+    assert found.severity == severity

@@ -160,7 +160,18 @@ def _tabulated(calibration: Calibration, options: argparse.Namespace) -> tuple[s
         f"map_x, map_y: to {K.width}×{K.height} pixels with fx = {K.fx:.2f}, fy = {K.fy:.2f}, "
         f"cx = {K.cx:.2f}, cy = {K.cy:.2f}.",
         f"rays: every {step:.3g} px; read bilinearly they are {sizes}.",
+        *_without_ray(name, off.share),
         f"{options.output}: written from {calibration.format}.",
+    )
+
+
+def _without_ray(name: str, fraction_with_ray: float) -> tuple[str, ...]:
+    """A warning where the table lacks rays."""
+    if fraction_with_ray == 1:
+        return ()
+    lost = f"{1 - fraction_with_ray:.2%}".replace("%", " %")
+    return (
+        f"warning: {name}: {lost} of the pixels have no ray; `rays` is NaN there. `camviz inspect` names the cause.",
     )
 
 

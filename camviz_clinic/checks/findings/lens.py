@@ -16,6 +16,7 @@ from camviz.distortion import (
     image_corner_radius,
     image_reach,
     is_rational,
+    pole_radius,
     valid_region,
     weakest_denominator,
 )
@@ -29,6 +30,7 @@ from camviz_clinic.checks.registry import Finding, Rng, finding
 from camviz_clinic.checks.virtual import alone, healthy
 
 LOST = 0.01  # of the pixels, fewer than which may fold
+MAX_FOLDED_BEYOND_CORNERS = 0.1  # of the pixels: a fold that takes more is a fault, wherever corners were seen
 CLOSE_PX = 0.5  # how well a pixel must return from OpenCV's inverse
 NEARLY_SIDEWAYS = cos(radians(85))  # beyond, a ray has no point on the plane z = 1 worth the name
 
@@ -40,8 +42,8 @@ NEARLY_SIDEWAYS = cos(radians(85))  # beyond, a ray has no point on the plane z 
     symptom="The border mirrors or folds back after undistortion.",
     causes=("a distortion polynomial that turns back inside the image", "no corners near the border in the fit"),
     remedy="Take fewer terms and solve again with more views that reach the border.",
-    threshold="Any such pixel lies on the border. It is a note where less than 1 % of the pixels are lost, beyond the "
-    "last corner of the board, and for a fisheye beyond 90°, whose picture may end before.",
+    threshold="Any such pixel lies on the border. It is a note where less than 1 % of the pixels are lost, and up to "
+    "10 % beyond the last corner of the board. So it is for a fisheye beyond 90°, whose picture may end before.",
     explains=("inverse-not-converged", "rectified-black"),
 )
 def fold(evidence: Evidence) -> Iterator[Finding]:
@@ -58,20 +60,33 @@ def fold(evidence: Evidence) -> Iterator[Finding]:
 def _fold(evidence: Evidence, name: str, camera: Camera) -> Iterator[Finding]:
     lens, turn = camera.lens, camera.lens.fold
     turns = turn is not None and turn.angle < inf
-    if _seen(camera, border_pixels(camera)).all() or not (turns or lens.may_mirror):
+    if _seen(camera, border_pixels(camera)).all() or not (turns or lens.may_mirror) or _ends_before_pole(lens):
         return
-    lost = 1 - float(valid_region(camera, max(1, camera.intrinsics.width // 128)).mean())
-    share = f"{lost:.0%}" if lost >= 0.01 else "less than 1 %"
-    sentence = f"{name}: {share} of the pixels have no ray of their own. The distortion {_where(camera)}."
+    lost = _lost(camera)
+    sentence = f"{name}: {_percent(lost)} of the pixels have no ray of their own. The distortion {_where(camera)}."
     if turn is None or not turns:
         yield fold.found(sentence, lost, "", name)
         return
     corners = evidence.calibration.detections.get(name)
-    seen = corners is not None and not _corners_lost(evidence, name, camera)
+    seen = corners is not None and not _corners_lost(evidence, name, camera) and lost <= MAX_FOLDED_BEYOND_CORNERS
     beyond = turn.angle >= pi / 2 and not _corners_lost(evidence, name, camera)
     severity = "note" if beyond or seen or lost < LOST else fold.severity
     remedy = f"{_fewer_terms(lens)}, and solve again with more views that reach the border."
     yield fold.found(sentence, turn.radius, turn.unit, name, severity=severity, remedy=remedy)
+
+
+def _lost(camera: Camera) -> float:
+    """The fraction of the pixels at which no ray arrives."""
+    return 1 - float(valid_region(camera, max(1, camera.intrinsics.width // 128)).mean())
+
+
+def _percent(fraction: float) -> str:
+    return f"{fraction:.0%}" if fraction >= 0.01 else "less than 1 %"
+
+
+def _ends_before_pole(lens: Lens) -> bool:
+    """Whether a pole ends the lens that its numerator almost cancels: `near_pole` reports it."""
+    return isinstance(lens, BrownConrady) and lens.cancelled_radius <= lens.limit_radius < inf
 
 
 def _fewer_terms(lens: Lens) -> str:
@@ -138,15 +153,21 @@ def near_pole(evidence: Evidence) -> Iterator[Finding]:
     if not rational:
         raise NotChecked("no lens here has a denominator (k4 k5 k6)")
     for name, camera in rational.items():
-        reach = image_reach(camera)
-        radius, least = weakest_denominator(camera.lens, reach)
-        if least < NEARLY_A_POLE:
-            what = "passes through 0, which is a pole," if least <= 0 else f"falls to {least:.3g}"
-            sentence = (
-                f"{name}: the denominator of the rational model {what} at r = {radius:.3g} focal lengths. "
-                f"The image reaches to {reach:.3g}."
-            )
-            yield near_pole.found(sentence, least, "", name)
+        lens, reach = camera.lens, image_reach(camera)
+        radius, least = weakest_denominator(lens, reach)
+        pole, cut = pole_radius(lens), _ends_before_pole(lens) and not _seen(camera, border_pixels(camera)).all()
+        if pole <= reach or cut:
+            what, radius, least = "is 0, which is a pole,", pole, min(least, 0.0)
+        elif least < NEARLY_A_POLE:
+            what = f"falls to {least:.3g}"
+        else:
+            continue
+        lost = f" Beyond it {_percent(_lost(camera))} of the pixels have no ray." if cut else ""
+        sentence = (
+            f"{name}: the denominator of the rational model {what} at r = {radius:.4f} focal lengths. "
+            f"The image reaches to {reach:.4f}.{lost}"
+        )
+        yield near_pole.found(sentence, least, "", name)
 
 
 @near_pole.fault("near-pole rational model", "", (0.5, 0.15, 0.05), promised=0.15)
