@@ -90,7 +90,7 @@ def _listing() -> str:
 
 def convert(options: argparse.Namespace) -> int:
     """Write a calibration in another format, whole or not at all."""
-    calibration = loaded(options.file, options.size)
+    whole = calibration = loaded(options.file, options.size)
     if options.output.exists() and options.output.samefile(options.file):
         raise Refusal(f"{options.output}: this would overwrite the calibration; choose another name.")
     from camviz_clinic.files import CalibrationError
@@ -112,7 +112,7 @@ def convert(options: argparse.Namespace) -> int:
         if fitted:
             cameras = {name: fit.camera for name, fit in fitted}
             calibration = replace(calibration, cameras=cameras, intrinsics_covariance={}, estimated={}, priors={})
-        said = _tabulated(calibration, options) if options.to == LUT else _converted(calibration, options)
+        said = (_tabulated if options.to == LUT else _converted)(calibration, whole, options)
     except CalibrationError as error:
         raise Refusal(str(error)) from error
     told = narrator(options.output)
@@ -123,10 +123,12 @@ def convert(options: argparse.Namespace) -> int:
     return OK
 
 
-def _converted(calibration: Calibration, options: argparse.Namespace) -> tuple[str, ...]:
+def _converted(calibration: Calibration, whole: Calibration, options: argparse.Namespace) -> tuple[str, ...]:
     """The calibration written; what there is to say of it."""
-    left_out = write_calibration(calibration, options.output, options.to)
-    return (*left_out, f"{options.output}: written from {calibration.format}, read back and found the same.")
+    from camviz_clinic.files.writing import without
+
+    lost = write_calibration(calibration, options.output, options.to, whole)
+    return (f"{options.output}: written from {whole.format}, read back and found the same{without(lost)}.",)
 
 
 def _refuse_stray(options: argparse.Namespace) -> None:
@@ -136,10 +138,11 @@ def _refuse_stray(options: argparse.Namespace) -> None:
             raise Refusal(f"--{name} belongs to --to lut, got --to {options.to}.")
 
 
-def _tabulated(calibration: Calibration, options: argparse.Namespace) -> tuple[str, ...]:
+def _tabulated(calibration: Calibration, whole: Calibration, options: argparse.Namespace) -> tuple[str, ...]:
     """The tables of the one camera written; what there is to say of them."""
     from camviz_clinic.files import CalibrationError
     from camviz_clinic.files.lookup_tables import STEP, LookupTables
+    from camviz_clinic.files.writing import lost_poses, without
 
     if len(calibration.cameras) > 1:
         names = ", ".join(calibration.cameras)
@@ -160,7 +163,7 @@ def _tabulated(calibration: Calibration, options: argparse.Namespace) -> tuple[s
         f"map_x, map_y: to {K.width}×{K.height} pixels with fx = {K.fx:.2f}, fy = {K.fy:.2f}, "
         f"cx = {K.cx:.2f}, cy = {K.cy:.2f}.",
         f"rays: every {step:.3g} px; read bilinearly they are {sizes}.",
-        f"{options.output}: written from {calibration.format}.",
+        f"{options.output}: written from {calibration.format}{without(lost_poses(calibration, whole))}.",
     )
 
 
