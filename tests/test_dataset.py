@@ -105,7 +105,7 @@ def test_pycolmap_reads_the_model_to_a_billionth_of_a_pixel(scene):
         X = POINTS @ cam_from_world[:3, :3].T + cam_from_world[:3, 3]
         uv = (X / X[:, 2:]) @ held["K"].T
         image = images[name]
-        assert image.camera.model.name == "PINHOLE"
+        assert image.camera.model.name == "SIMPLE_PINHOLE"  # as the pixels are square
         theirs = image.camera.img_from_cam(image.cam_from_world() * POINTS)
         assert np.abs(theirs - 0.5 - uv[:, :2]).max() < 1e-9
 

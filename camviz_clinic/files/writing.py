@@ -7,13 +7,14 @@ import shlex
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from camviz.lenses import Perspective
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.enumeration import enumerated
 from camviz_clinic.calibration.types import Calibration, CalibrationError
@@ -61,10 +62,11 @@ def write(
 
     >>> from pathlib import Path
     >>> from camviz.cameras import Camera, Intrinsics
-    >>> one = Calibration({"camera": Camera(Intrinsics.from_fov(640, 480, 90))}, Path(), "a data sheet")
-    >>> write(one, "camera.yaml", "ros")
-    ()
-    >>> load("camera.yaml").cameras["camera"].intrinsics == one.cameras["camera"].intrinsics
+    >>> from camviz.lenses import BrownConrady
+    >>> one = Calibration({"left": Camera(Intrinsics.from_fov(640, 480, 90), BrownConrady(-0.1))}, Path(), "made")
+    >>> write(one, "camera.yaml", "ros"), write(one, "calib.json", "matlab")
+    ((), ('the name left (now camera)',))
+    >>> load("camera.yaml").cameras["left"].intrinsics == one.cameras["left"].intrinsics
     True
     """
     path = Path(path)
@@ -235,7 +237,8 @@ def _lost(calibration: Calibration, whole: Calibration, format: Format, part: Pa
     if changed or len(back.cameras) != len(calibration.cameras):
         raise CalibrationError(f"what would be written is not read back as the same cameras ({changed[:3]})")
     poses = lost_poses(calibration, whole, format.own_world)
-    return (*poses, *size, *_renamed(calibration, back), *_missing(calibration, back, whole))
+    lost = *poses, *size, *_lost_pinhole(calibration, back), *_renamed(calibration, back)
+    return (*lost, *_missing(calibration, back, whole))
 
 
 def _loaded(part: Path, calibration: Calibration) -> tuple[Calibration, list[str]]:
@@ -287,6 +290,13 @@ def _described(pose: RigidTransform, length: str) -> str:
     return f"{length} {1000 * np.linalg.norm(pose.translation):.4g} mm, rotation {angle:.2f}°"
 
 
+def _lost_pinhole(calibration: Calibration, back: Calibration) -> list[str]:
+    """What `inspect` would otherwise take for coefficients that somebody forgot."""
+    pairs = zip(calibration.cameras.values(), back.cameras.values(), strict=True)
+    zeros = [a for a, b in pairs if isinstance(a.lens, Perspective) and not isinstance(b.lens, Perspective)]
+    return ["the mark of a pinhole (its distortion coefficients are zeros)"] if zeros else []
+
+
 def _renamed(calibration: Calibration, back: Calibration) -> list[str]:
     names = [f"{old} (now {new})" for old, new in zip(calibration.cameras, back.cameras, strict=True) if old != new]
     return [f"the name{'s' * (len(names) > 1)} {enumerated(names, MAX_LISTED)}"] if names else []
@@ -327,10 +337,12 @@ def _alike(value: Any, back: Any) -> bool:
     """Whether what was recorded of the cameras, in their order, is read back to rounding."""
     if isinstance(value, Mapping):
         value, back = tuple(value.values()), tuple(back.values())
-    if isinstance(value, RigidTransform):
+    elif isinstance(value, RigidTransform):
         value, back = value.as_matrix(), back.as_matrix()
+    elif is_dataclass(value):
+        value, back = (tuple(getattr(each, field.name) for field in fields(value)) for each in (value, back))
     if isinstance(value, tuple):
         return len(value) == len(back) and all(map(_alike, value, back))
-    if isinstance(value, np.ndarray):
-        return value.shape == back.shape and np.allclose(value, back, rtol=1e-9, atol=1e-9, equal_nan=True)
-    return bool(value == back)
+    if isinstance(value, (float, np.ndarray)) and np.shape(value) == np.shape(back) and back is not None:
+        return np.allclose(value, back, rtol=1e-9, atol=1e-12, equal_nan=True)
+    return bool(value is back or np.array_equal(value, back))
