@@ -42,10 +42,10 @@ def test_the_mapping_is_opencvs_to_a_hundredth_of_a_pixel(alpha):
 
 def test_pixels_are_square_and_k_is_opencvs_along_one_axis():
     """OpenCV fits the picture along each axis: without borders the larger f is kept, with every pixel the smaller."""
-    for alpha, chosen in ((0, max), (1, min)):
+    for alpha, chosen, stretch in ((0, max, 0.05), (1, min, 0.001)):
         K, _ = cv2.getOptimalNewCameraMatrix(GRID.K, np.array([-0.28, 0.1, 1e-3, -5e-4]), (640, 480), alpha)
         target = Undistortion.of(BARREL, alpha).target
-        assert abs(K[0, 0] / K[1, 1] - 1) > 0.03
+        assert abs(K[0, 0] / K[1, 1] - 1) > stretch
         assert target.fx == target.fy == pytest.approx(chosen(K[0, 0], K[1, 1]), rel=5e-3)
         ends = [(0.0 - K[:2, 2]) / np.diag(K)[:2], ([639, 479] - K[:2, 2]) / np.diag(K)[:2]]
         middle = target.fx * np.mean(ends, axis=0) + [target.cx, target.cy]

@@ -170,7 +170,10 @@ def undistorted_intrinsics(
         raise ValueError("alpha = 0 needs an upright rectangle around the axis that the camera sees; it sees none")
     filling = [_filling(inner, intrinsics), _filling(outer, intrinsics)]
     if square:
-        filling = [_centred_on(inner, max(filling[0][:2]), intrinsics), _centred_on(outer, min(filling[1][:2]), intrinsics)]
+        filling = [
+            _centred_on(inner, max(filling[0][:2]), intrinsics),
+            _centred_on(outer, min(filling[1][:2]), intrinsics),
+        ]
     fx, fy, cx, cy = ((1 - alpha) * filling[0] + alpha * filling[1]).tolist()
     result = Intrinsics(intrinsics.width, intrinsics.height, fx, fy, cx, cy)
     first, last = np.ceil(result.to_pixels(inner[:2]) - 1e-6), np.floor(result.to_pixels(inner[2:]) + 1e-6)

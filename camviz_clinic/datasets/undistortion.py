@@ -42,7 +42,7 @@ class Undistortion:
         """The undistortion from no black border (`alpha` 0) to every pixel of the photograph (1).
 
         Pixels are square: fx = fy. A plain lens shows the rectangle of OpenCV's choice in the middle of the picture.
-        With a fisheye the pictures keep the principal point of the photographs, as a wide field would be shifted by far.
+        With a fisheye the pictures keep the principal point of the photographs: a wide field would be shifted by far.
 
         Args:
             camera: With any lens.

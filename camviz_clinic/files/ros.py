@@ -1,4 +1,4 @@
-"""ROS CameraInfo: the file (camera_matrix …) and the message itself (K D R P, in ROS 2 k d r p); of a pair two files."""
+"""ROS CameraInfo: the file (camera_matrix …), of a pair two, and the message itself (K D R P, in ROS 2 k d r p)."""
 
 from __future__ import annotations
 
@@ -194,7 +194,7 @@ def write(calibration: Calibration) -> Content:
 
 
 def rectified(calibration: Calibration) -> Mapping[str, Rectification]:
-    """R and P of a pair's cameras by cv2.stereoRectify, or cv2.fisheye.stereoRectify, as ROS's cameracalibrator has them.
+    """R and P of a pair's cameras by cv2.stereoRectify, or that of cv2.fisheye, as ROS's cameracalibrator makes them.
 
     Both pictures are without black borders and have their principal points in one place (CALIB_ZERO_DISPARITY).
 
@@ -260,8 +260,8 @@ FORMAT = Format(
     folder_from=2,
     rectifies=True,
     models=listed(MODELS),
-    says="file or message; a pair is a folder of two files with stereoRectify's R and P, P[0,3] = −fx B; one file alone "
-    "has the baseline as a note",
+    says="file or message; a pair is a folder of two files with stereoRectify's R and P, P[0,3] = −fx B; in one file "
+    "alone this is read as a note",
     lacks="skew",
     rank=70,
 )

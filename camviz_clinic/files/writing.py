@@ -37,6 +37,24 @@ BY_CAMERA = (
     "line_delays",
     "rectifications",
 )
+KINDS = {
+    "board": "the board",
+    "detections": "the detected corners",
+    "cam_from_board": "the poses of the board",
+    "per_view_errors": "the errors of the views",
+    "pictures": "the names of the pictures",
+    "set_aside": "which corners were set aside",
+    "estimated": "which parameters were estimated",
+    "intrinsics_covariance": "their covariance",
+    "priors": "the prior on the denominator",
+    "board_warp": "the bend of the board",
+    "board_warp_covariance": "its covariance",
+    "skipped": "the pictures that were skipped",
+    "stamps": "what it was made for and when",
+    "line_delays": "the line delay of the rolling shutter",
+    "world_from_imu": "the place of the IMU",
+    "rectifications": "the rectification R and P",
+}
 MAX_LISTED = 4  # names in a sentence
 
 
@@ -112,7 +130,9 @@ def _refuse_half_a_pair(calibration: Calibration, whole: Calibration, format: Fo
     if not (format.rectifies and len(whole.cameras) == 2 and len(calibration.cameras) == 1):
         return
     (lost,) = lost_poses(calibration, whole)
-    command = shlex.join(["camviz", "convert", str(whole.source), str(path.with_name(format.name)), "--to", format.name])
+    command = shlex.join(
+        ["camviz", "convert", str(whole.source), str(path.with_name(format.name)), "--to", format.name]
+    )
     raise CalibrationError(f"{format.title} of one camera loses {lost}: write both, with `{command}`")
 
 
@@ -197,9 +217,7 @@ def _file(path: Path, content: bytes, read_back: Callable[[Path], tuple[str, ...
     return lost
 
 
-def _folder(
-    path: Path, content: dict[str, bytes], read_back: Callable[[Path], tuple[str, ...]]
-) -> tuple[str, ...]:
+def _folder(path: Path, content: dict[str, bytes], read_back: Callable[[Path], tuple[str, ...]]) -> tuple[str, ...]:
     """A folder that was not there, or was empty."""
     if path.exists() and not (path.is_dir() and not any(path.iterdir())):
         raise CalibrationError(f"{path}: expected the name of a new folder, or of an empty one")
@@ -303,25 +321,8 @@ def _renamed(calibration: Calibration, back: Calibration) -> list[str]:
 
 
 def _missing(calibration: Calibration, back: Calibration, whole: Calibration) -> list[str]:
-    kinds = {
-        "board": "the board",
-        "detections": "the detected corners",
-        "cam_from_board": "the poses of the board",
-        "per_view_errors": "the errors of the views",
-        "pictures": "the names of the pictures",
-        "set_aside": "which corners were set aside",
-        "estimated": "which parameters were estimated",
-        "intrinsics_covariance": "their covariance",
-        "priors": "the prior on the denominator",
-        "board_warp": "the bend of the board",
-        "skipped": "the pictures that were skipped",
-        "stamps": "what it was made for and when",
-        "line_delays": "the line delay of the rolling shutter",
-        "world_from_imu": "the place of the IMU",
-        "rectifications": "the rectification R and P",
-    }
     lost = []
-    for field, what in kinds.items():
+    for field, what in KINDS.items():
         if _is_known(getattr(whole, field)) and not _is_known(getattr(back, field)):
             lost.append(what)
         elif _is_known(value := getattr(calibration, field)) and not _alike(value, getattr(back, field)):
