@@ -57,7 +57,9 @@ def add(commands: Any) -> None:
     command = add_command(commands, "convert", convert, "write a calibration for another program", CONVERT)
     command.epilog, command.listing = EXAMPLES, _listing
     command.add_argument("file", metavar="IN", type=Path, help="the calibration, or the folder of a COLMAP model")
-    command.add_argument("output", metavar="OUT", type=Path, help="the file to write; for COLMAP, and a pair for ROS, a new folder")
+    command.add_argument(
+        "output", metavar="OUT", type=Path, help="the file to write; for COLMAP, and a pair for ROS, a new folder"
+    )
     command.add_argument("--to", metavar="FORMAT", required=True, help="one of the formats below, or lut")
     command.add_argument("--size", metavar="WxH", type=size, help="image size in pixels, where IN does not hold it")
     command.add_argument("--camera", metavar="NAME", help="only this one of the cameras")

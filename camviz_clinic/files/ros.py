@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -177,20 +178,25 @@ def _key(section: Section, names: tuple[str, ...]) -> str:
 
 
 def write(calibration: Calibration) -> Content:
-    """The file of camera_calibration_parsers for each camera; of a pair the files of a folder, by the cameras' names.
+    """The file of camera_calibration_parsers for one camera; of a pair the files of a folder, by the cameras' names.
 
     R and P are the calibration's own, or of a pair OpenCV's, or of a camera alone R = 1 and P = [K 0].
     """
-    cameras, rectifications = calibration.cameras, calibration.rectifications
-    if len(cameras) > 1 and set(rectifications) != set(cameras):
-        rectifications = rectified(calibration)
-    files = {}
-    for name, camera in cameras.items():
-        matrices = rectifications.get(name, _plain(camera))
-        files[re.sub(r"[^\w.-]", "_", name) + ".yaml"] = _written(name, camera, matrices)
-    if len(files) < len(cameras):
+    if len(calibration.cameras) == 1:
+        return write_one(calibration)
+    cameras, matrices = calibration.cameras, calibration.rectifications
+    if set(matrices) != set(cameras):
+        matrices = rectified(calibration)
+    names = {name: re.sub(r"[^\w.-]", "_", name) + ".yaml" for name in cameras}
+    if len(set(names.values())) < len(cameras):
         raise CalibrationError(f"{TITLE}: {' and '.join(cameras)} would have one file name: rename one of them")
-    return files if len(files) > 1 else next(iter(files.values()))
+    return {names[name]: _written(name, camera, matrices[name]) for name, camera in cameras.items()}
+
+
+def write_one(calibration: Calibration) -> bytes:
+    """The file of one camera."""
+    ((name, camera),) = calibration.cameras.items()
+    return _written(name, camera, _matrices(calibration))
 
 
 def rectified(calibration: Calibration) -> Mapping[str, Rectification]:
@@ -223,10 +229,12 @@ def rectified(calibration: Calibration) -> Mapping[str, Rectification]:
     pinholes = [(same.intrinsics.K, np.array(model.values(same, 0.0)[4:])) for model, same in held]
     right_from_left = calibration.rig.a_from_b(names[1], names[0])
     pose = right_from_left.rotation.as_matrix(), np.reshape(right_from_left.translation, (3, 1))
+    zero = cv2.CALIB_ZERO_DISPARITY
+    found: tuple[Any, ...]
     if fisheyes[0]:
-        found = cv2.fisheye.stereoRectify(*pinholes[0], *pinholes[1], sizes[0], *pose, cv2.CALIB_ZERO_DISPARITY)
+        found = cv2.fisheye.stereoRectify(*pinholes[0], *pinholes[1], sizes[0], *pose, zero)
     else:
-        found = cv2.stereoRectify(*pinholes[0], *pinholes[1], sizes[0], *pose, flags=cv2.CALIB_ZERO_DISPARITY, alpha=0)
+        found = cv2.stereoRectify(*pinholes[0], *pinholes[1], sizes[0], *pose, flags=zero, alpha=0)
     R1, R2, P1, P2 = found[:4]
     if not (np.isfinite(P2).all() and P2[0, 0] > 0):
         raise CalibrationError(f"{TITLE}: OpenCV finds no rectified picture of {names[0]} and {names[1]}")
