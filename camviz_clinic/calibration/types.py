@@ -18,6 +18,7 @@ from camviz_clinic.calibration.boards import kind_of
 from camviz_clinic.calibration.boards.aprilgrid import FAMILY
 from camviz_clinic.calibration.denominator_prior import DenominatorPrior
 from camviz_clinic.calibration.line_delay import LineDelay
+from camviz_clinic.calibration.rectification import Rectification
 from camviz_clinic.calibration.redundancy import Redundancy
 from camviz_clinic.calibration.stamp import Stamp
 from camviz_clinic.calibration.undecided import Undecided
@@ -216,6 +217,7 @@ class Calibration:
         stamps: What the calibration of each camera holds for.
         line_delays: How long each camera's rolling shutter takes from row to row, where that is known. The corners are
             then where a shutter of all rows at once would have seen them.
+        rectifications: How each camera's pictures are rectified, where the file has R and P beside K, as ROS's do.
         undecided: Combinations of each camera's intrinsics that the corners do not decide, where these were more than
             `detections` holds, as those of several boards; the worst first. No file holds it.
 
@@ -249,6 +251,7 @@ class Calibration:
     redundant: tuple[Redundancy, ...] = ()
     stamps: Mapping[str, Stamp] = field(default_factory=dict)
     line_delays: Mapping[str, LineDelay] = field(default_factory=dict)
+    rectifications: Mapping[str, Rectification] = field(default_factory=dict, repr=False)
     undecided: Mapping[str, tuple[Undecided, ...]] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:

@@ -208,7 +208,7 @@ def _of_stills(options: argparse.Namespace, of_films: tuple[str, ...]) -> int:
         told(sentence)
     if doctored := "" if options.rig or is_rolling(options) else _prescribed(shots, options, calibration):
         told(f"Is the board as described? {doctored}")
-    told(f"{options.output}: written.{left_out}")
+    told(f"{options.output}: written{left_out}.")
     return judged(calibration, dict(zip(calibration.cameras, folders.values(), strict=True)), options, gate)
 
 

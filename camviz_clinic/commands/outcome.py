@@ -65,11 +65,12 @@ def refuse_parallel(calibration: Calibration) -> None:
 
 
 def written(calibration: Calibration, options: argparse.Namespace, form: str) -> str:
-    """Writes it; what the format could not hold, in sentences after a space."""
+    """Writes it; what the format could not hold, as the end of the sentence that says "written"."""
     from camviz_clinic.files import CalibrationError
+    from camviz_clinic.files.writing import without
 
     try:
-        return "".join(f" {sentence}" for sentence in write_calibration(calibration, options.output, form))
+        return without(write_calibration(calibration, options.output, form))
     except CalibrationError as error:
         raise Refusal(str(error)) from error
     except OSError as error:

@@ -89,10 +89,11 @@ def equals(camera: Camera) -> Iterator[Camera]:
 
 def same_camera(a: Camera, b: Camera, tolerance: float = 1e-11) -> bool:
     """True where both have the same pixels, the same lens under one name or another, and the same pose."""
-    return _same_pose(a, b, tolerance) and any(_same_values(form, b, tolerance) for form in equals(a))
+    return same_pose(a, b, tolerance) and any(_same_values(form, b, tolerance) for form in equals(a))
 
 
-def _same_pose(a: Camera, b: Camera, tolerance: float) -> bool:
+def same_pose(a: Camera, b: Camera, tolerance: float = 1e-11) -> bool:
+    """True where both stand in one place and look one way."""
     first, second = a.world_from_cam.as_matrix(), b.world_from_cam.as_matrix()
     return bool(np.abs(first - second).max() <= tolerance * max(1.0, float(np.abs(first).max())))
 

@@ -77,7 +77,7 @@ def bad_k(evidence: Evidence) -> Iterator[Finding]:
 def transposed(rng: Rng, strength: float) -> Evidence:
     """K is transposed (1), or multiplied."""
     solved = healthy(rng)
-    tree, K = yaml.safe_load(ros.write(solved)), solved.cameras["camera"].intrinsics.K
+    tree, K = yaml.safe_load(ros.write_one(solved)), solved.cameras["camera"].intrinsics.K
     tree["camera_matrix"]["data"] = (K.T if strength == 1 else strength * K).ravel().tolist()
     return as_file(yaml.safe_dump(tree))
 
@@ -101,7 +101,7 @@ def coefficient_count(evidence: Evidence) -> Iterator[Finding]:
 @coefficient_count.fault("mislabelled coefficients", "numbers", (4, 5, 8), promised=4)
 def mislabelled(rng: Rng, strength: float) -> Evidence:
     """The file has another number of coefficients than the model's name."""
-    tree = yaml.safe_load(ros.write(healthy(rng)))
+    tree = yaml.safe_load(ros.write_one(healthy(rng)))
     held = tree["distortion_coefficients"]
     held["data"] = [*held["data"], 1e-3, 1e-4, 1e-5][: round(strength)]
     held["cols"] = len(held["data"])
