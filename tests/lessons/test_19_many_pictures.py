@@ -176,10 +176,10 @@ def test_the_second_step(says):
     first, second = np.linalg.norm(np.diff(centres, axis=0), axis=1)
     assert (first, second) == pytest.approx(STEPS)
     assert ratio == second / first
-    assert np.abs(ThreeViews(length=ratio.value).errors).max() < 1e-9
-    assert np.linalg.norm(ThreeViews(length=1.0).errors[2], axis=-1).min() > 10
+    assert np.abs(ThreeViews(length=ratio.value).residuals).max() < 1e-9
+    assert np.linalg.norm(ThreeViews(length=1.0).residuals[2], axis=-1).min() > 10
     for scale in (0.2, 0.8):
-        assert np.abs(ThreeViews(length=ratio.value, scale=scale).errors).max() < 1e-9
+        assert np.abs(ThreeViews(length=ratio.value, scale=scale).residuals).max() < 1e-9
     three, again = says(
         "You get `points` (n, 3) in the second camera's frame, R and `direction` of third_from_second, "
         "and `rays` (n, 3)"
@@ -228,7 +228,7 @@ def bundle():
         ]
         world = x[12:].reshape(-1, 3)
         return np.concatenate(
-            [(project(world @ R.T + t, camera) - uv).ravel() for (R, t), uv in zip(each, seen, strict=True)]
+            [(uv - project(world @ R.T + t, camera)).ravel() for (R, t), uv in zip(each, seen, strict=True)]
         )
 
     end = least_squares(errors, start, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15).x
@@ -326,11 +326,31 @@ def test_opencv_s_points_are_the_true_ones_after_alignment(says):
     assert np.abs(ThreeViews(length=STEPS[1] / STEPS[0]).model[1] - points).max() <= 1e-6 * np.abs(points).max()
 
 
+def test_a_residual_is_detected_less_projected(says):
+    """A point detected 1 px to the right of its projection has the residual (+1, 0), as the glossary has it."""
+    says("is where a point was detected, less where the model projects it.")
+    scene = true_scene()
+    poses = [one.cam_from_world for one in scene.cameras]
+    turns, steps = np.array([[p.rotation.as_rotvec(), p.translation] for p in poses]).swapaxes(0, 1)
+    right = exercise("19.residuals").reference(turns, steps, scene.points, scene.seen + (1.0, 0.0), CAMERA.intrinsics.K)
+    np.testing.assert_allclose(right, np.broadcast_to([1.0, 0.0], right.shape), atol=1e-9)
+    model = ThreeViews(length=0.5 * STEPS[1] / STEPS[0])
+    (first, second), points = scene.pairs, model.model[1]
+    at = cv2.projectPoints(
+        (second.rotation * first.rotation).apply(points)
+        + second.rotation.apply(first.translation)
+        + model.length * second.translation,
+        np.zeros(3), np.zeros(3), CAMERA.intrinsics.K, None,
+    )[0][:, 0]  # fmt: skip
+    np.testing.assert_allclose(model.residuals[2], scene.seen[2] - at, atol=1e-9)
+
+
 def test_shapes_of_the_residuals(says):
-    three, again, two = says(
-        "For m cameras with rotation vectors `turns` (m, 3) and translations `steps` (m, 3), both cam_from_world, and "
-        "n points: where does each camera see each point, less where it was `seen` (m, n, 2)?"
+    three, again, two, same = says(
+        "You get rotation vectors `turns` (m, 3) and translations `steps` (m, 3) of m cameras, both cam_from_world, "
+        "n points, and where each camera has `seen` them (m, n, 2). Return the residuals (m, n, 2)."
     )
+    assert same == two.value
     R = Rotation.from_rotvec(np.zeros((4, 3))).as_matrix()
     assert three == again.value == R.shape[-1]
     assert two.value + 1 == R.shape[-1]

@@ -483,10 +483,10 @@ def without_n(share, n, sure):
 
 
 def residuals(turns: Array, steps: Array, points: Array, seen: Array, K: Array) -> Array:
-    """Where (m, n, 2) m cameras see n points, less where they were `seen`; [R | t] by rotation vectors and t (m, 3)."""
+    """Where n points were `seen` (m, n, 2), less where m cameras project them; rotation vectors and t are (m, 3)."""
     R = Rotation.from_rotvec(turns).as_matrix()
     x = (points @ np.swapaxes(R, 1, 2) + steps[:, None]) @ K.T
-    return x[..., :2] / x[..., 2:] - seen
+    return seen - x[..., :2] / x[..., 2:]
 
 
 def _bundles(rng: np.random.Generator) -> Iterator[Arguments]:
@@ -518,7 +518,7 @@ def camera_by_camera(turns, steps, points, seen, K):
     found = []
     for turn, t, uv in zip(turns, steps, seen, strict=True):
         x = (Rotation.from_rotvec(turn).apply(points) + t) @ K.T
-        found.append(x[:, :2] / x[:, 2:] - uv)
+        found.append(uv - x[:, :2] / x[:, 2:])
     return np.array(found)
 
 
@@ -527,13 +527,13 @@ def by_opencv_for_each_camera(turns, steps, points, seen, K):
     import cv2
 
     each = [cv2.projectPoints(points, turn, t, K, None)[0][:, 0] for turn, t in zip(turns, steps, strict=True)]
-    return np.array(each) - seen
+    return seen - np.array(each)
 
 
 @RESIDUALS.right
 def by_einsum_over_all(turns, steps, points, seen, K):
     x = np.einsum("mij,nj->mni", K @ Rotation.from_rotvec(turns).as_matrix(), points) + (steps @ K.T)[:, None]
-    return x[..., :2] / x[..., 2:] - seen
+    return seen - x[..., :2] / x[..., 2:]
 
 
 def _changed(turns, steps, points, seen, K, *, back=False, centre=False, flat=True, divide=True):
@@ -542,13 +542,11 @@ def _changed(turns, steps, points, seen, K, *, back=False, centre=False, flat=Tr
     x = X @ (R if back else np.swapaxes(R, 1, 2))
     x = x if centre else x + steps[:, None]
     x = x @ K.T if flat else x
-    return (x[..., :2] / x[..., 2:] if divide else x[..., :2]) - seen
+    return seen - (x[..., :2] / x[..., 2:] if divide else x[..., :2])
 
 
-@RESIDUALS.wrong(
-    "The sign is turned round: a residual here is where the model has the point, *less* where it was seen."
-)
-def seen_less_model(turns, steps, points, seen, K):
+@RESIDUALS.wrong("The sign is reversed. A residual is where the point was seen, *less* where the camera projects it.")
+def projected_less_seen(turns, steps, points, seen, K):
     return -residuals(turns, steps, points, seen, K)
 
 
@@ -572,9 +570,9 @@ def without_the_division(turns, steps, points, seen, K):
     return _changed(turns, steps, points, seen, K, divide=False)
 
 
-@RESIDUALS.wrong("This is where the points appear. A residual has `seen` subtracted.")
-def nothing_subtracted(turns, steps, points, seen, K):
-    return residuals(turns, steps, points, 0 * seen, K)
+@RESIDUALS.wrong("This is where the cameras project the points. A residual is `seen` less that.")
+def projections_alone(turns, steps, points, seen, K):
+    return -residuals(turns, steps, points, 0 * seen, K)
 
 
 @RESIDUALS.wrong("These are the *sizes* of the residuals. The optimiser squares them by itself, and needs their signs.")
