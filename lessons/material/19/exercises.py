@@ -272,7 +272,7 @@ def second_to_last(uv, to):
 
 
 def second_step(points: Array, R: Array, direction: Array, rays: Array) -> float:
-    """The length s for which R X + s d lies on the ray of each point X: (n, 3) points and rays, (3,) d."""
+    """The length ℓ for which R X + ℓ d lies on the ray of each point X: (n, 3) points and rays, (3,) d."""
     a = np.cross(rays, direction)
     b = np.cross(rays, points @ R.T)
     return -np.sum(a * b) / np.sum(a * a)
@@ -298,9 +298,9 @@ STEP = Exercise(
     reference=second_step,
     cases=_steps,
     hints=(
-        "R X + s d lies on the ray r. Then two vectors are parallel. What is their cross product?",
-        "r × (R X) + s (r × d) = 0: call them b + s a = 0, three equations for each point. For all points together, "
-        "s is least squares in one unknown.",
+        "R X + ℓ d lies on the ray r. Then two vectors are parallel. What is their cross product?",
+        "r × (R X) + ℓ (r × d) = 0: call them b + ℓ a = 0, three equations for each point. For all points together, "
+        "ℓ is least squares in one unknown.",
         "`return -np.sum(a * b) / ___`",
     ),
     praise="One number, from all points at once. Which points tell most about it?",
@@ -329,7 +329,7 @@ def across_each_ray(points, R, direction, rays):
     return -(a * b).sum() / (a**2).sum()
 
 
-@STEP.wrong("The sign is flipped: from b + s a = 0 follows s = −b/a.")
+@STEP.wrong("The sign is flipped: from b + ℓ a = 0 follows ℓ = −b/a.")
 def sign_flipped(points, R, direction, rays):
     return -second_step(points, R, direction, rays)
 
@@ -364,7 +364,7 @@ def first_point_alone(points, R, direction, rays):
     return second_step(points[:1], R, direction, rays[:1])
 
 
-@STEP.wrong("You divide by the sum of b², where the sum of a² belongs: a stands before the unknown s.")
+@STEP.wrong("You divide by the sum of b², where the sum of a² belongs: a stands before the unknown ℓ.")
 def divided_by_b(points, R, direction, rays):
     a, b = np.cross(rays, direction), np.cross(rays, points @ R.T)
     return -np.sum(a * b) / np.sum(b * b)
@@ -602,9 +602,9 @@ def aligned(points: Array, true: Array) -> Array:
     """Points (n, 3) moved, turned and scaled so that they lie as near to the true ones (n, 3) as they can."""
     middle, target = points.mean(axis=0), true.mean(axis=0)
     a, b = points - middle, true - target
-    U, s, Vt = np.linalg.svd(b.T @ a)
+    U, singular, Vt = np.linalg.svd(b.T @ a)
     sign = np.array([1, 1, np.linalg.det(U @ Vt)])
-    scale = np.sum(s * sign) / np.sum(a**2)
+    scale = np.sum(singular * sign) / np.sum(a**2)
     return scale * a @ (U * sign @ Vt).T + target
 
 
@@ -631,9 +631,10 @@ ALIGNED = Exercise(
     tolerance=1e-7,
     hints=(
         "Take the middles away first. Then a rotation is left, and one scale.",
-        "`np.linalg.svd` of Bᵀ A gives U, s and Vᵀ. The rotation is U D Vᵀ with D = diag(1, 1, ±1), so that it is no "
-        "mirror image. The scale is the sum of s times D's signs, over the sum of the squares of a.",
-        "`scale = np.sum(s * sign) / ___`",
+        "`np.linalg.svd` of Bᵀ A gives U, the singular values and Vᵀ. The rotation is U D Vᵀ with D = diag(1, 1, ±1), so "
+        "that it is no mirror image. The scale is the sum of D's signs times the singular values, over the sum of the "
+        "squares of a.",
+        "`scale = np.sum(singular * sign) / ___`",
     ),
     praise="Three numbers of place, three of rotation and one of scale: pictures leave these seven free.",
 )
