@@ -482,7 +482,9 @@ def test_photons_stir_every_block(says):
     """A linear file, and sRGB's curve by IEC 61966-2-1, above its linear part."""
     full, bits = says("Take a pixel that is full at 10,000 electrons, in a linear file of 8 bits.")
     grey, held, steps = says("At a grey value of 100 it holds 3,900 of them, and the photons' noise is 1.6 steps.")
-    by_srgb, fewer = says("stands for 1,270 electrons, and the noise is 1.3 steps. Either is enough to stir every block.")
+    by_srgb, fewer = says(
+        "stands for 1,270 electrons, and the noise is 1.3 steps. Either is enough to stir every block."
+    )
     white = 2**bits.value - 1
     linear = (grey.value / white, lambda share: share)
     srgb = ((grey.value / white + 0.055) / 1.055) ** 2.4, lambda share: 1.055 * share ** (1 / 2.4) - 0.055

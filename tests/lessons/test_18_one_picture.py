@@ -317,9 +317,7 @@ def test_the_horizon_tells_how_the_camera_stood(says):
 
 def test_the_distance_of_two_points_does_not_tell_f(says):
     """OpenCV's pixels of both directions: the distance changes with the turn, −(q₁ − c)·(q₂ − c) does not."""
-    f, at_0, none, at_25, turn = says(
-        "At f = 417 px the points are 839 px apart at a turn of 0°, and 1,492 px at 25°."
-    )
+    f, at_0, none, at_25, turn = says("At f = 417 px the points are 839 px apart at a turn of 0°, and 1,492 px at 25°.")
     middle, directions = np.array([319.5, 239.5]), [(-1e9, 0, 0), (0, 0, 1e9)]
     for degrees, apart in ((none.value, at_0), (turn.value, at_25)):
         first, second = by_opencv(camera(degrees), directions)
@@ -330,7 +328,7 @@ def test_the_distance_of_two_points_does_not_tell_f(says):
 
 
 def test_any_known_angle_gives_an_equation_for_f(says):
-    """Two directions 60° apart: only the true f makes their rays meet at 60°; at 90° one point at infinity tells none."""
+    """Of directions 60° apart only the true f makes rays 60° apart; at 90° a point at infinity tells none."""
     says("Any known angle gives an equation for f; a right angle gives the short one above.")
     says("For a right angle neither point may lie at infinity.")
     says("A known angle, seen aslant, tells f.")
@@ -349,14 +347,16 @@ def test_any_known_angle_gives_an_equation_for_f(says):
 
 
 def test_each_gap_has_its_own_help(says):
-    """A wall seen squarely has both points at infinity; twice the scene and twice the step give the same two pictures."""
+    """A wall seen squarely has both points at infinity; twice the scene and twice the step give the same pictures."""
     says("The points of its level and of its upright edges are both at infinity")
     square = camera(42.0, aside=-3.0)
     for direction in ((-1.0, 0, 0), (0, 1.0, 0)):
         assert (square.extrinsics[0] @ direction)[2] == pytest.approx(0, abs=1e-9)
     says("A second picture from another place tells depth, and never the scale.")
     R, t = square.extrinsics
-    one, twice = (cv2.projectPoints(s * CORNERS, R, s * (t - (0.3, 0, 0)), square.intrinsics.K, None)[0] for s in (1, 2))
+    one, twice = (
+        cv2.projectPoints(s * CORNERS, R, s * (t - (0.3, 0, 0)), square.intrinsics.K, None)[0] for s in (1, 2)
+    )
     np.testing.assert_allclose(one, twice, atol=1e-9)
     (square_on,) = says("right only in a level picture of walls both seen at 45°.")
     f, both = 400.0, np.radians((square_on.value, 30))

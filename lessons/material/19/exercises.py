@@ -631,9 +631,9 @@ ALIGNED = Exercise(
     tolerance=1e-7,
     hints=(
         "Take the middles away first. Then a rotation is left, and one scale.",
-        "`np.linalg.svd` of Bᵀ A gives U, the singular values and Vᵀ. The rotation is U D Vᵀ with D = diag(1, 1, ±1), so "
-        "that it is no mirror image. The scale is the sum of D's signs times the singular values, over the sum of the "
-        "squares of a.",
+        "`np.linalg.svd` of Bᵀ A gives U, the singular values and Vᵀ. The rotation is U D Vᵀ with D = diag(1, 1, ±1), "
+        "so that it is no mirror image. The scale is the sum of D's signs times the singular values, over the sum of "
+        "the squares of a.",
         "`scale = np.sum(singular * sign) / ___`",
     ),
     praise="Three numbers of place, three of rotation and one of scale: pictures leave these seven free.",
