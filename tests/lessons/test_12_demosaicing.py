@@ -959,8 +959,8 @@ def test_the_quiz_about_the_green_numbers(says):
 def test_algorithms_differ_on_upright_stripes_but_not_on_a_chessboard(says):
     """Beside colour_demosaicing's bilinear and Menon: 1.59 and 0, and equal mosaics of grey and magenta."""
     f, by_bilinear = says(
-        "For vertical stripes of 0.48 cycles per pixel, red − blue swings by 1.59 with bilinear interpolation, and by 0 "
-        "with the edge-aware and Menon's algorithm."
+        "For vertical stripes of 0.48 cycles per pixel, red − blue swings by 1.59 with bilinear interpolation, and by "
+        "0 with the edge-aware and Menon's algorithm."
     )
     says("from a chessboard of single pixels none can")
     rggb = mosaics.BAYER["RGGB"]
