@@ -242,15 +242,15 @@ class CalibrationView(OrbitView, EstimateNumbers):
         return float(_MAGNIFIED[np.abs(np.log(_MAGNIFIED * max(typical, 1e-3) / 9)).argmin()])
 
     def _vectors(self, panel: Panel) -> str:
-        """The residuals, magnified, from where the estimated camera would see a corner towards where it was found."""
+        """The residuals, magnified, from where the estimated camera projects a corner towards where it was detected."""
         if self.adjustment is None:
             return ""
-        residuals, found = self.residuals, self.corners
-        starts, ends = panel.place(found), panel.place(found + self.magnified * residuals)
+        projected = self.corners - self.residuals
+        starts, ends = panel.place(projected), panel.place(projected + self.magnified * self.residuals)
         others = np.arange(self.count) != self.index
         faint = "" if self.photographs else svg.segments(starts[others], ends[others], "red thin half")
-        here = svg.dots(starts[self.index], "orange", 4) + svg.segments(starts[self.index], ends[self.index], "red")
-        return faint + here
+        dots = svg.dots(panel.place(self.corners[self.index]), "orange", 4)
+        return faint + dots + svg.segments(starts[self.index], ends[self.index], "red")
 
     @property
     def _grips(self) -> Array:

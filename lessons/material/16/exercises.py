@@ -1,6 +1,6 @@
 """Lesson 16, the clinic: statistics of residuals, a first diagnosis, what the next view tells, and what none can tell.
 
-Residuals are observed less projected, in pixels, (views, corners, 2) or (rows, columns, 2), NaN where nothing was seen.
+Residuals are detected less projected, in pixels, (views, corners, 2) or (rows, columns, 2), NaN where nothing was seen.
 """
 
 from __future__ import annotations

@@ -239,7 +239,7 @@ def columns_alone(first, second, centre):
     return np.sqrt(np.where(product > 0, product, np.nan))
 
 
-@FOCAL_LENGTH.wrong("This is half the distance between the points: right only where the corner is in the middle.")
+@FOCAL_LENGTH.wrong("This is half the distance of the points: right only in a level picture of walls both seen at 45°.")
 def half_the_distance(first, second, centre):
     half = np.linalg.norm(first - second, axis=-1) / 2
     return np.where(np.sum((first - centre) * (second - centre), axis=-1) < 0, half, np.nan)
@@ -543,12 +543,12 @@ PRINCIPAL_POINT = Exercise(
         "(a − p) · (b − c) = 0 says (b − c) · p = (b − c) · a. A second corner gives a second row: solve both for p.",
         "`return np.linalg.solve(sides, [(b - c) @ a, ___])`, where `sides` has the rows b − c and c − a",
     ),
-    praise="It is where the three heights of the triangle cross.",
+    praise="It is the orthocentre: there the three altitudes of the triangle meet.",
 )
 
 
 @PRINCIPAL_POINT.right
-def by_crossing_two_heights(a, b, c):
+def by_crossing_two_altitudes(a, b, c):
     def upright(corner, one, other):
         along = one - other
         return np.array([along[0], along[1], -(along @ corner)])
@@ -570,13 +570,13 @@ def by_the_circumcentre(a, b, c):
     return a + b + c - 2 * middle
 
 
-@PRINCIPAL_POINT.wrong("This is the mean of the three corners. The principal point is where the *heights* cross.")
+@PRINCIPAL_POINT.wrong("This is the mean of the three corners. The principal point is where the *altitudes* meet.")
 def centroid(a, b, c):
     return (a + b + c) / 3
 
 
 @PRINCIPAL_POINT.wrong(
-    "This is the middle of the circle through the corners. The principal point is where the heights cross."
+    "This is the middle of the circle through the corners. The principal point is where the altitudes meet."
 )
 def circumcentre(a, b, c):
     A = 2 * np.array([b - a, c - a])
@@ -584,7 +584,7 @@ def circumcentre(a, b, c):
 
 
 @PRINCIPAL_POINT.wrong(
-    "This is the middle of the circle inside the triangle, where the angles' halves cross. Take the heights."
+    "This is the middle of the circle inside the triangle, where the angles' halves meet. Take the altitudes."
 )
 def incentre(a, b, c):
     sides = np.array([np.linalg.norm(b - c), np.linalg.norm(c - a), np.linalg.norm(a - b)])
@@ -596,23 +596,23 @@ def wrong_corner(a, b, c):
     return np.linalg.solve(np.array([b - c, c - a]), [(b - c) @ a, (c - a) @ c])
 
 
-@PRINCIPAL_POINT.wrong("You use the side that begins at the corner. The height stands on the side *opposite*.")
+@PRINCIPAL_POINT.wrong("You use the side that begins at the corner. The altitude stands on the side *opposite*.")
 def adjacent_side(a, b, c):
     return np.linalg.solve(np.array([a - b, b - c]), [(a - b) @ a, (b - c) @ b])
 
 
-@PRINCIPAL_POINT.wrong("Below the right sides stands one corner twice. Each height has a corner of its own.")
+@PRINCIPAL_POINT.wrong("Below the right sides stands one corner twice. Each altitude has a corner of its own.")
 def one_corner_twice(a, b, c):
     return np.linalg.solve(np.array([b - c, c - a]), [(b - c) @ a, (c - a) @ a])
 
 
-@PRINCIPAL_POINT.wrong("This is the foot of one height, on the side opposite a. The heights cross farther on.")
-def foot_of_a_height(a, b, c):
+@PRINCIPAL_POINT.wrong("This is the foot of one altitude, on the side opposite a. The altitudes meet farther on.")
+def foot_of_an_altitude(a, b, c):
     along = c - b
     return b + along * ((a - b) @ along) / (along @ along)
 
 
-@PRINCIPAL_POINT.wrong("This is the middle of one side. The principal point lies on the heights of the triangle.")
+@PRINCIPAL_POINT.wrong("This is the middle of one side. The principal point lies on the altitudes of the triangle.")
 def middle_of_a_side(a, b, c):
     return (a + b) / 2
 

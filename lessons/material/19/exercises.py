@@ -272,7 +272,7 @@ def second_to_last(uv, to):
 
 
 def second_step(points: Array, R: Array, direction: Array, rays: Array) -> float:
-    """The length s for which R X + s d lies on the ray of each point X: (n, 3) points and rays, (3,) d."""
+    """The length ℓ for which R X + ℓ d lies on the ray of each point X: (n, 3) points and rays, (3,) d."""
     a = np.cross(rays, direction)
     b = np.cross(rays, points @ R.T)
     return -np.sum(a * b) / np.sum(a * a)
@@ -298,9 +298,9 @@ STEP = Exercise(
     reference=second_step,
     cases=_steps,
     hints=(
-        "R X + s d lies on the ray r. Then two vectors are parallel. What is their cross product?",
-        "r × (R X) + s (r × d) = 0: call them b + s a = 0, three equations for each point. For all points together, "
-        "s is least squares in one unknown.",
+        "R X + ℓ d lies on the ray r. Then two vectors are parallel. What is their cross product?",
+        "r × (R X) + ℓ (r × d) = 0: call them b + ℓ a = 0, three equations for each point. For all points together, "
+        "ℓ is least squares in one unknown.",
         "`return -np.sum(a * b) / ___`",
     ),
     praise="One number, from all points at once. Which points tell most about it?",
@@ -329,7 +329,7 @@ def across_each_ray(points, R, direction, rays):
     return -(a * b).sum() / (a**2).sum()
 
 
-@STEP.wrong("The sign is flipped: from b + s a = 0 follows s = −b/a.")
+@STEP.wrong("The sign is flipped: from b + ℓ a = 0 follows ℓ = −b/a.")
 def sign_flipped(points, R, direction, rays):
     return -second_step(points, R, direction, rays)
 
@@ -364,7 +364,7 @@ def first_point_alone(points, R, direction, rays):
     return second_step(points[:1], R, direction, rays[:1])
 
 
-@STEP.wrong("You divide by the sum of b², where the sum of a² belongs: a stands before the unknown s.")
+@STEP.wrong("You divide by the sum of b², where the sum of a² belongs: a stands before the unknown ℓ.")
 def divided_by_b(points, R, direction, rays):
     a, b = np.cross(rays, direction), np.cross(rays, points @ R.T)
     return -np.sum(a * b) / np.sum(b * b)
@@ -483,10 +483,10 @@ def without_n(share, n, sure):
 
 
 def residuals(turns: Array, steps: Array, points: Array, seen: Array, K: Array) -> Array:
-    """Where (m, n, 2) m cameras see n points, less where they were `seen`; [R | t] by rotation vectors and t (m, 3)."""
+    """Where n points were `seen` (m, n, 2), less where m cameras project them; rotation vectors and t are (m, 3)."""
     R = Rotation.from_rotvec(turns).as_matrix()
     x = (points @ np.swapaxes(R, 1, 2) + steps[:, None]) @ K.T
-    return x[..., :2] / x[..., 2:] - seen
+    return seen - x[..., :2] / x[..., 2:]
 
 
 def _bundles(rng: np.random.Generator) -> Iterator[Arguments]:
@@ -518,7 +518,7 @@ def camera_by_camera(turns, steps, points, seen, K):
     found = []
     for turn, t, uv in zip(turns, steps, seen, strict=True):
         x = (Rotation.from_rotvec(turn).apply(points) + t) @ K.T
-        found.append(x[:, :2] / x[:, 2:] - uv)
+        found.append(uv - x[:, :2] / x[:, 2:])
     return np.array(found)
 
 
@@ -527,13 +527,13 @@ def by_opencv_for_each_camera(turns, steps, points, seen, K):
     import cv2
 
     each = [cv2.projectPoints(points, turn, t, K, None)[0][:, 0] for turn, t in zip(turns, steps, strict=True)]
-    return np.array(each) - seen
+    return seen - np.array(each)
 
 
 @RESIDUALS.right
 def by_einsum_over_all(turns, steps, points, seen, K):
     x = np.einsum("mij,nj->mni", K @ Rotation.from_rotvec(turns).as_matrix(), points) + (steps @ K.T)[:, None]
-    return x[..., :2] / x[..., 2:] - seen
+    return seen - x[..., :2] / x[..., 2:]
 
 
 def _changed(turns, steps, points, seen, K, *, back=False, centre=False, flat=True, divide=True):
@@ -542,13 +542,11 @@ def _changed(turns, steps, points, seen, K, *, back=False, centre=False, flat=Tr
     x = X @ (R if back else np.swapaxes(R, 1, 2))
     x = x if centre else x + steps[:, None]
     x = x @ K.T if flat else x
-    return (x[..., :2] / x[..., 2:] if divide else x[..., :2]) - seen
+    return seen - (x[..., :2] / x[..., 2:] if divide else x[..., :2])
 
 
-@RESIDUALS.wrong(
-    "The sign is turned round: a residual here is where the model has the point, *less* where it was seen."
-)
-def seen_less_model(turns, steps, points, seen, K):
+@RESIDUALS.wrong("The sign is reversed. A residual is where the point was seen, *less* where the camera projects it.")
+def projected_less_seen(turns, steps, points, seen, K):
     return -residuals(turns, steps, points, seen, K)
 
 
@@ -572,9 +570,9 @@ def without_the_division(turns, steps, points, seen, K):
     return _changed(turns, steps, points, seen, K, divide=False)
 
 
-@RESIDUALS.wrong("This is where the points appear. A residual has `seen` subtracted.")
-def nothing_subtracted(turns, steps, points, seen, K):
-    return residuals(turns, steps, points, 0 * seen, K)
+@RESIDUALS.wrong("This is where the cameras project the points. A residual is `seen` less that.")
+def projections_alone(turns, steps, points, seen, K):
+    return -residuals(turns, steps, points, 0 * seen, K)
 
 
 @RESIDUALS.wrong("These are the *sizes* of the residuals. The optimiser squares them by itself, and needs their signs.")
@@ -604,9 +602,9 @@ def aligned(points: Array, true: Array) -> Array:
     """Points (n, 3) moved, turned and scaled so that they lie as near to the true ones (n, 3) as they can."""
     middle, target = points.mean(axis=0), true.mean(axis=0)
     a, b = points - middle, true - target
-    U, s, Vt = np.linalg.svd(b.T @ a)
+    U, singular, Vt = np.linalg.svd(b.T @ a)
     sign = np.array([1, 1, np.linalg.det(U @ Vt)])
-    scale = np.sum(s * sign) / np.sum(a**2)
+    scale = np.sum(singular * sign) / np.sum(a**2)
     return scale * a @ (U * sign @ Vt).T + target
 
 
@@ -633,9 +631,10 @@ ALIGNED = Exercise(
     tolerance=1e-7,
     hints=(
         "Take the middles away first. Then a rotation is left, and one scale.",
-        "`np.linalg.svd` of Bᵀ A gives U, s and Vᵀ. The rotation is U D Vᵀ with D = diag(1, 1, ±1), so that it is no "
-        "mirror image. The scale is the sum of s times D's signs, over the sum of the squares of a.",
-        "`scale = np.sum(s * sign) / ___`",
+        "`np.linalg.svd` of Bᵀ A gives U, the singular values and Vᵀ. The rotation is U D Vᵀ with D = diag(1, 1, ±1), "
+        "so that it is no mirror image. The scale is the sum of D's signs times the singular values, over the sum of "
+        "the squares of a.",
+        "`scale = np.sum(singular * sign) / ___`",
     ),
     praise="Three numbers of place, three of rotation and one of scale: pictures leave these seven free.",
 )
