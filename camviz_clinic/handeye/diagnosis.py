@@ -1,4 +1,4 @@
-"""What is wrong with a robot's poses, by the pictures that belong to them."""
+"""What is wrong with a robot's poses, by the pictures that belong to them: long because a finding rules out others."""
 
 from __future__ import annotations
 
