@@ -281,7 +281,8 @@ def inspect_file(
     except CalibrationError as error:
         if not error.id:
             raise
-        finding = kinds()[error.id].found(f"{str(error).removeprefix(f'{Path(path)}: ')}.", error.value)
+        text = str(error).removeprefix(f"{Path(path)}: ")
+        finding = kinds()[error.id].of_file(CalibrationError(text, error.id, error.value, error.remedy))
         why = "the file could not be read beyond the fault above"
         skipped = tuple((id, why) for id in _asked_of_all() if id != error.id)
         return Inspection(None, (finding,), (error.id,), skipped, source=Path(path), made=(finding,))
