@@ -46,7 +46,7 @@ def wrong_size(evidence: Evidence) -> list[Finding]:
         *(each for name, camera in evidence.cameras.items() for each in _exchanged(name, camera)),
         *_other_pictures(evidence),
         *_corners_outside(evidence),
-        *(each for name, camera in evidence.cameras.items() for each in _clean_factor(name, camera)),
+        *(each for name, camera in evidence.cameras.items() for each in _of_another_size(name, camera)),
         *(each for name, camera in evidence.cameras.items() for each in _too_wide(name, camera)),
         *_other_scale(evidence),
     ]
@@ -116,14 +116,19 @@ def _corners_outside(evidence: Evidence) -> Iterator[Finding]:
             yield wrong_size.found(sentence, value, "times", name)
 
 
-def _clean_factor(name: str, camera: Camera) -> Iterator[Finding]:
-    """(cx, cy) the same clean multiple of the middle on both axes: a camera matrix of another resolution."""
-    grid = camera.intrinsics
+def clean_factor(grid: Intrinsics) -> Fraction | None:
+    """The clean multiple of the middle that cx and cy both are: that of another resolution; None where they are not."""
     factors = np.array([(grid.cx + 0.5) / (grid.width / 2), (grid.cy + 0.5) / (grid.height / 2)])
     if not (factors > 0).all() or (abs(factors - 1) < 2 * ALIKE).any():
-        return
+        return None
     clean = min(CLEAN, key=lambda factor: abs(np.log(factors / float(factor))).max())
-    if abs(np.log(factors / float(clean))).max() < ALIKE:
+    return clean if abs(np.log(factors / float(clean))).max() < ALIKE else None
+
+
+def _of_another_size(name: str, camera: Camera) -> Iterator[Finding]:
+    """A camera matrix of another resolution."""
+    grid = camera.intrinsics
+    if clean := clean_factor(grid):
         sentence = (
             f"{name}: the principal point ({grid.cx:.1f}, {grid.cy:.1f}) is the middle of an image of "
             f"{grid.width * clean}×{grid.height * clean}, {clean} times this one's {grid.width}×{grid.height}."
@@ -206,7 +211,7 @@ def principal_point(evidence: Evidence) -> Iterator[Finding]:
     for name, camera in evidence.cameras.items():
         grid = camera.intrinsics
         distance, longer = off_centre(grid), max(grid.width, grid.height)
-        explained = sides_exchanged(grid) or any(True for _ in _clean_factor(name, camera))  # by wrong-size
+        explained = sides_exchanged(grid) or clean_factor(grid) is not None  # by wrong-size
         if distance > OFF_CENTRE * longer and not explained:
             sentence = (
                 f"{name}: the principal point ({grid.cx:.1f}, {grid.cy:.1f}) is {distance:.0f} px from the middle of "
