@@ -62,7 +62,7 @@ OF_A_PAIR: dict[str, Any] = {
     "warning.",
     explains=(
         *WRONG_NUMBERS,
-        *("aspect", "principal-point", "parallel-boards", "half-pixel", "board-warp"),
+        *("aspect", "principal-point", "parallel-boards", "focal-uncertain", "half-pixel", "board-warp"),
         *("rectified-black", "baseline-scale", "zero-distortion", "rolling-shutter", "wrong-size", "not-a-rotation"),
     ),
 )
