@@ -247,7 +247,7 @@ def test_every_id_has_a_check_and_words_and_is_either_checked_or_skipped_with_a_
     _, calibration = healthy
     assert {id for id, _ in inspect(calibration).skipped} == {
         "models-differ", "contradiction", "near-pole", "baseline-sign", "rectified-black", "inverted-transform",
-        "corner-order", "wrong-board", "interpolated-corners", "other-settings",
+        "corner-order", "wrong-board", "interpolated-corners", "other-settings", "sides-exchanged",
     }  # fmt: skip
 
 
@@ -266,7 +266,7 @@ def test_the_json_has_the_form_that_the_documentation_gives(left_classic):
 def test_the_worst_comes_first_and_a_healthy_calibration_says_what_was_checked(healthy):
     _, calibration = healthy
     said = inspect(calibration).as_text()
-    assert said.startswith("Nothing wrong was found; 30 checks ran, 10 could not because the file holds one camera")
+    assert said.startswith("Nothing wrong was found; 31 checks ran, 11 could not because the file holds one camera")
     assert "\nNext: " in said
     assert "\nChecked: assumed-coefficients, assumed-reading, not-a-rotation, bad-k" in said
     K = calibration.cameras["camera"]

@@ -28,7 +28,7 @@ from camviz_clinic.views.guidance import GuidanceView
 from camviz_clinic.views.uncertainty import UncertaintyView
 
 SKIPPED = (
-    "10 could not because the file holds one camera, not a pair, and because no pictures of the board were given "
+    "11 could not because the file holds one camera, not a pair, and because no pictures of the board were given "
     "(--images) (4 more reasons below)"
 )
 
@@ -54,14 +54,14 @@ def changed(lens=None, **pinhole):
 
 
 def test_a_healthy_calibration_says_that_nothing_is_wrong_by_how_many_checks_and_why_not_by_more(solved):
-    assert inspect(solved).verdict == f"Nothing wrong was found, 2 notes below; 28 checks ran, {SKIPPED}."
+    assert inspect(solved).verdict == f"Nothing wrong was found, 2 notes below; 31 checks ran, {SKIPPED}."
 
 
 def test_of_many_reasons_the_verdict_gives_two_and_counts_the_rest():
     inspection = inspect(bare())
     reasons = {why for _, why in inspection.skipped}
     assert inspection.verdict.startswith(
-        "Nothing wrong was found; 12 checks ran, 26 could not because the file holds no"
+        "Nothing wrong was found; 14 checks ran, 28 could not because the file holds no"
     )
     assert inspection.verdict.endswith(f"({len(reasons) - 2} more reasons below).")
 
@@ -78,7 +78,7 @@ def test_of_many_reasons_the_verdict_gives_two_and_counts_the_rest():
         (
             changed(BrownConrady(k1=-0.3, k2=-0.5)),
             "Most likely a distortion polynomial that turns back inside the image: "
-            "fix k2 to 0, and solve again with more views that reach the border.",
+            "solve again with more views that reach the border, with all of the model's radial terms.",
             "1 fault and 1 consequence: the worst, camera: 28% of the pixels have no ray of their own.",
         ),
         (

@@ -66,7 +66,9 @@ def _as_many(model: Model, values: Array) -> str:
         return f"{said}If cv2.fisheye made them, write equidistant."
     if others:
         return f"Write {others[0]} as the name of the model."
-    return "Keep the camera in OpenCV's YAML, which has all of these terms, or solve again with 8 (rational_polynomial)."
+    return (
+        "Keep the camera in OpenCV's YAML, which has all of these terms, or solve again with 8 (rational_polynomial)."
+    )
 
 
 def _notes(section: Section) -> tuple[str, ...]:

@@ -175,7 +175,7 @@ def mislabelled(rng: Rng, strength: float) -> Evidence:
     symptom="All distortion coefficients are zero.",
     causes=("coefficients that were never estimated, or not kept", "a picture that was undistorted before"),
     remedy="Keep the coefficients that the calibration returns. If the pictures are undistorted already, "
-    "say so where the file can (rectified, PINHOLE).",
+    "write a format that has pinholes (camviz convert --to colmap), or pass --ignore zero-distortion.",
     threshold="All are zero and, where there are corners, k1 is at least five standard deviations from 0.",
     explains=(
         *VIEW_BY_VIEW,

@@ -37,7 +37,7 @@ TURNED_DEG = 35.0
     view="boards",
     symptom="The baseline has the wrong sign.",
     causes=("a left and a right camera that were swapped",),
-    remedy="Swap the cameras, or the roles of the files, and solve again.",
+    remedy="Exchange the names left and right, with their pictures.",
     threshold="t.x is above 0 and the larger part of the baseline.",
     explains=("rectified-black",),
 )
@@ -77,8 +77,8 @@ swapped = baseline_sign.fault("swapped cameras", "", (1,), promised=1)(_exchange
     symptom="The baseline has the wrong length.",
     causes=("one unit of length taken for another", "another side of a square in one of the solutions"),
     remedy="Scale all translations, or solve again with the side of the board's squares as measured (--square-mm).",
-    threshold="The baseline is 2 % off other evidence, above 10 m or below 1 mm. A unit is named within 2 % of its ratio. "
-    "Or a square is above half a metre or below half a millimetre.",
+    threshold="The baseline is 2 % off other evidence, above 10 m or below 1 mm. A unit is named within 2 % of its "
+    "ratio. Or a square is above half a metre or below half a millimetre.",
 )
 def baseline_scale(evidence: Evidence) -> Iterator[Finding]:
     """The check compares the baseline with its measured length, with the board poses of the same file, with the other

@@ -202,8 +202,8 @@ def resized_pictures(rng: Rng, strength: float) -> Evidence:
         "a crop that was not applied to the camera matrix",
         "too few tilted views, so that the principal point follows the noise",
     ),
-    remedy="Check whether the pictures were cropped. If not, fix the principal point or add tilted views, "
-    "and solve again.",
+    remedy="If the pictures were cropped, subtract the crop's first pixel from cx and cy. After a crop to one side "
+    "ignore this warning. If they were not, fix the principal point or add tilted views, and solve again.",
     threshold="They are a tenth of the image's longer side apart.",
 )
 def principal_point(evidence: Evidence) -> Iterator[Finding]:
