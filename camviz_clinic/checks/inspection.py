@@ -152,7 +152,8 @@ class Inspection:
     @property
     def compared(self) -> tuple[str, ...]:
         """How far it is from the calibration that it is compared with, in sentences."""
-        return tuple(each.sentence for each in (*self.differences, *self.pair_differences))
+        by_pair = (each.sentence for each in self.pair_differences)
+        return (*(each.sentence for each in self.differences), *by_pair)
 
     def _board_warp(self) -> dict[str, Any]:
         """The board's two sagittas and their σ in mm, where they were solved for."""

@@ -66,7 +66,7 @@ def _exchanged(name: str, camera: Camera) -> Iterator[Finding]:
             off_centre(grid),
             "px",
             name,
-            causes=("width and height exchanged in the file", "pictures turned by a quarter after the calibration"),
+            causes=("an image size written as height and width", "pictures turned by a quarter after the calibration"),
             remedy=f"Exchange width and height in the file: {grid.height}×{grid.width}. "
             "If the pictures are turned, turn them back.",
         )
