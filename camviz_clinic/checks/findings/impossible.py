@@ -68,8 +68,8 @@ OF_A_PAIR: dict[str, Any] = {
 )
 def impossible_numbers(evidence: Evidence) -> Iterator[Finding]:
     """The check compares the corners with where the numbers put them. It also takes the rays of the image's pixels,
-    p1 and p2, the focal lengths and the principal point beside the picture's sides, and those of a pair beside each
-    other, and the way from each camera to the next one.
+    p1 and p2. It compares the focal lengths and the principal point with the picture's sides, and the two focal lengths
+    of a pair with each other. It measures the way from each camera to the next one.
     """
     for name, camera in evidence.cameras.items():
         yield from next(filter(None, (list(each) for each in _of_camera(evidence, name, camera))), ())
