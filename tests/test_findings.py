@@ -503,3 +503,33 @@ def test_corners_in_pictures_are_found_for_a_file_without_them(capsys):
     assert main([*words, "--board", "9x6", "--square-mm", "25", "--json"]) == 0
     tree = json.loads(capsys.readouterr().out)
     assert "pose-absorbs-error" in tree["checked"]
+
+
+def test_sides_are_exchanged_where_the_principal_point_fits_so():
+    """The middles of 480×640 and 640×480 are 80√2 px apart: at two thirds of the way the second is half as far."""
+    for by, id in ((1 - 1e-9, "principal-point"), (1 + 1e-9, "wrong-size")):
+        off = 80 * 2 / 3 * by
+        camera = Camera(Intrinsics(480, 640, 535.0, 535.0, 239.5 + off, 319.5 - off), Perspective())
+        assert ids(inspect(camviz_clinic.Calibration({"c": camera}, Path("made"), "made"))) == {id}
+
+
+def test_two_baselines_differ_in_millimetres_and_in_depth():
+    """B 2.1 % longer: at one disparity Z = f B / d is 2.1 % deeper, 21 mm at 1 m and 63 mm at 3 m; 1000 times is mm."""
+    camera = Camera(Intrinsics(640, 480, 535.0, 535.0, 319.5, 239.5), Perspective())
+
+    def pair(baseline):
+        right = camera.at(RigidTransform.from_translation([baseline, 0, 0]))
+        return camviz_clinic.Calibration({"left": camera, "right": right}, Path("made"), "made")
+
+    for at, mm in ((None, 21), (3.0, 63)):
+        inspection = inspect(pair(0.08 * 1.021), compare=pair(0.08), at=at)
+        (apart,) = inspection.pair_differences
+        assert apart.baseline_mm - apart.other_mm == pytest.approx(1.68)
+        assert apart.depth_mm == pytest.approx(mm, rel=1e-6)
+        finding = one(inspection, "baseline-scale")
+        assert "1.7 mm (2.1%) longer than the 80 mm" in finding.sentence
+        assert f"At {at or 1:g} m their depths differ by {mm} mm" in finding.sentence
+        assert "metres taken" not in " ".join(finding.causes)
+    assert one(inspect(pair(80.0), compare=pair(0.08)), "baseline-scale").causes == ("millimetres taken for metres",)
+    near = (math.exp(0.02 * 0.999), math.exp(0.02 * 1.001))
+    assert ["baseline-scale" in ids(inspect(pair(0.08 * r), compare=pair(0.08))) for r in near] == [False, True]
