@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pytest
 import yaml
@@ -248,7 +249,7 @@ def test_every_id_has_a_check_and_words_and_is_either_checked_or_skipped_with_a_
     _, calibration = healthy
     assert {id for id, _ in inspect(calibration).skipped} == {
         "models-differ", "contradiction", "near-pole", "baseline-sign", "rectified-black", "inverted-transform",
-        "corner-order", "wrong-board", "interpolated-corners", "other-settings",
+        "corner-order", "wrong-board", "interpolated-corners", "other-settings", "sides-exchanged",
     }  # fmt: skip
 
 
@@ -268,7 +269,7 @@ def test_the_worst_comes_first_and_a_healthy_calibration_says_what_was_checked(h
     _, calibration = healthy
     said = inspect(calibration).as_text()
     assert said.startswith("Good to ±")
-    assert "No problem found; 28 checks ran, 10 could not because the file holds one camera" in said
+    assert "No problem found; 31 checks ran, 11 could not because the file holds one camera" in said
     assert "\nNext: " in said
     assert "\nChecked: assumed-coefficients, assumed-reading, not-a-rotation, bad-k" in said
     K = calibration.cameras["camera"]
@@ -339,11 +340,49 @@ def test_a_transposed_k_is_read_on_as_the_camera_that_was_meant(tmp_path):
         np.testing.assert_allclose(inspection.calibration.cameras["camera"].intrinsics.K, K)
 
 
-def test_a_negative_focal_length_in_k_leaves_nothing_to_look_at(tmp_path):
-    K = np.array([[-500.0, 0, 320], [0, 500, 240], [0, 0, 1]])
-    inspection = inspect_file(write(tmp_path / "k.yml", image_width=640, image_height=480, K=K, D=np.zeros((1, 5))))
-    asked = sum(not kind.asked_of for kind in kinds().values())
-    assert (inspection.calibration, ids(inspection), len(inspection.skipped)) == (None, {"bad-k"}, asked - 1)
+@pytest.mark.parametrize(
+    ("focal", "id", "meaning"),
+    [
+        ((500, -500), "reversed-axis", "the y axis points up (OpenGL)"),
+        ((-500, 500), "reversed-axis", "the x axis points left, or the camera looks along -z"),
+        ((-500, -500), "reversed-axis", "x points left and y up (PyTorch3D)"),
+        ((0, 500), "not-calibrated", "fx = 0: the camera is not calibrated"),
+        ((500, 0), "not-calibrated", "fy = 0: the camera is not calibrated"),
+    ],
+)
+def test_a_focal_length_that_is_not_positive_says_why(tmp_path, focal, id, meaning):
+    """In OpenCV's matrix and in Kalibr's list of four numbers; nothing is left to look at."""
+    (fx, fy), asked = focal, sum(not kind.asked_of for kind in kinds().values())
+    K = np.array([[fx, 0, 320.0], [0, fy, 240], [0, 0, 1]])
+    opencv = write(tmp_path / "k.yml", image_width=640, image_height=480, K=K, D=np.zeros((1, 5)))
+    part = {"camera_model": "pinhole", "intrinsics": [fx, fy, 320, 240], "distortion_model": "none"}
+    kalibr = tmp_path / "chain.yaml"
+    kalibr.write_text(yaml.safe_dump({"cam0": {**part, "distortion_coeffs": [], "resolution": [640, 480]}}))
+    for path in opencv, kalibr:
+        inspection = inspect_file(path)
+        assert (inspection.calibration, ids(inspection), len(inspection.skipped)) == (None, {id}, asked - 1)
+        assert meaning in one(inspection, id).sentence
+
+
+def test_a_camera_matrix_of_zeros_is_not_calibrated(tmp_path):
+    """ROS 2 publishes one until a camera is calibrated."""
+    message = {"height": 720, "width": 1280, "distortion_model": "", "d": [], "k": [0.0] * 9, "p": [0.0] * 12}
+    (tmp_path / "ros.yaml").write_text(yaml.safe_dump(message))
+    assert ids(inspect_file(tmp_path / "ros.yaml")) == {"not-calibrated"}
+
+
+@pytest.mark.parametrize(("focal", "flip"), [((500, -510), [1, -1, 1]), ((-500, 510), [-1, 1, 1])])
+def test_the_remedy_for_a_reversed_axis_is_the_same_camera(focal, flip):
+    """OpenCV projects the points of reversed axes through both: f positive, and p1 (y) or p2 (x) negated."""
+    points = np.array([[0.1, 0.2, 1.0], [-0.3, 0.15, 1.2], [0.25, -0.3, 0.9]])
+    D = np.array([-0.2, 0.05, 2e-3, -3e-3, 0.01])
+    turned = D * ([1, 1, -1, 1, 1] if flip[1] < 0 else [1, 1, 1, -1, 1])
+    K = [np.array([[fx, 0, 320.0], [0, fy, 240], [0, 0, 1]]) for fx, fy in (focal, np.abs(focal))]
+    here, there = (
+        cv2.projectPoints(each, np.zeros(3), np.zeros(3), k, d)[0]
+        for each, k, d in ((points, K[0], D), (points * flip, K[1], turned))
+    )
+    np.testing.assert_allclose(here, there, atol=1e-10)
 
 
 def test_a_rotation_that_is_mended_is_the_nearest_one(tmp_path):
@@ -511,3 +550,33 @@ def test_a_fold_of_a_tenth_of_the_image_is_a_fault(lost, severity, monkeypatch):
     )
     (found,) = lens_findings.fold.check(evidence)
     assert found.severity == severity
+
+
+def test_sides_are_exchanged_where_the_principal_point_fits_so():
+    """The middles of 480×640 and 640×480 are 80√2 px apart: at two thirds of the way the second is half as far."""
+    for by, id in ((1 - 1e-9, "principal-point"), (1 + 1e-9, "wrong-size")):
+        off = 80 * 2 / 3 * by
+        camera = Camera(Intrinsics(480, 640, 535.0, 535.0, 239.5 + off, 319.5 - off), Perspective())
+        assert ids(inspect(camviz_clinic.Calibration({"c": camera}, Path("made"), "made"))) == {id}
+
+
+def test_two_baselines_differ_in_millimetres_and_in_depth():
+    """B 2.1 % longer: at one disparity Z = f B / d is 2.1 % deeper, 21 mm at 1 m and 63 mm at 3 m; 1000 times is mm."""
+    camera = Camera(Intrinsics(640, 480, 535.0, 535.0, 319.5, 239.5), Perspective())
+
+    def pair(baseline):
+        right = camera.at(RigidTransform.from_translation([baseline, 0, 0]))
+        return camviz_clinic.Calibration({"left": camera, "right": right}, Path("made"), "made")
+
+    for at, mm in ((None, 21), (3.0, 63)):
+        inspection = inspect(pair(0.08 * 1.021), compare=pair(0.08), at=at)
+        (apart,) = inspection.pair_differences
+        assert apart.baseline_mm - apart.other_mm == pytest.approx(1.68)
+        assert apart.depth_mm == pytest.approx(mm, rel=1e-6)
+        finding = one(inspection, "baseline-scale")
+        assert "1.7 mm (2.1%) longer than the 80 mm" in finding.sentence
+        assert f"At {at or 1:g} m their depths differ by {mm} mm" in finding.sentence
+        assert "metres taken" not in " ".join(finding.causes)
+    assert one(inspect(pair(80.0), compare=pair(0.08)), "baseline-scale").causes == ("millimetres taken for metres",)
+    near = (math.exp(0.02 * 0.999), math.exp(0.02 * 1.001))
+    assert ["baseline-scale" in ids(inspect(pair(0.08 * r), compare=pair(0.08))) for r in near] == [False, True]

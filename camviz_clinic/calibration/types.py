@@ -33,6 +33,7 @@ class CalibrationError(ValueError):
         sentence: The message: where, what was expected, what came.
         id: The clinic's finding that this is, such as "bad-k"; empty where the file is simply unreadable.
         value: The number that shows it.
+        remedy: What to change in the file, where that is known.
 
     >>> from camviz_clinic.files import load
     >>> load("none.yaml")
@@ -40,9 +41,9 @@ class CalibrationError(ValueError):
     camviz_clinic.calibration.types.CalibrationError: none.yaml: there is no such file
     """
 
-    def __init__(self, sentence: str, id: str = "", value: float | None = None) -> None:
+    def __init__(self, sentence: str, id: str = "", value: float | None = None, remedy: str = "") -> None:
         super().__init__(sentence)
-        self.id, self.value = id, value
+        self.id, self.value, self.remedy = id, value, remedy
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import Lens, same_lenses, spelled
 from camviz_clinic.calibration.types import CalibrationError
-from camviz_clinic.files.section import explained
+from camviz_clinic.files.section import explained, refuse_focal_lengths
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,7 @@ class Model:
         focal = held.pop("f", None)
         fx, fy = (held.pop(name, focal) for name in ("fx", "fy"))
         cx, cy = held.pop("cx") - first_pixel, held.pop("cy") - first_pixel
+        refuse_focal_lengths(fx, fy, where)  # type: ignore[arg-type]
         with explained(where):
             intrinsics = Intrinsics(width, height, fx, fy, cx, cy, held.pop("skew", 0.0))  # type: ignore[arg-type]
             return Camera(intrinsics, self.lens(**held))

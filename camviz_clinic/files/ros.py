@@ -13,6 +13,7 @@ import numpy as np
 
 from camviz.cameras import Camera
 from camviz.lenses import BrownConrady, KannalaBrandt, Lens
+from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.rectification import Rectification
 from camviz_clinic.calibration.types import Calibration, CalibrationError
@@ -20,7 +21,7 @@ from camviz_clinic.files.format import Content, File, Format, chosen, listed
 from camviz_clinic.files.models import Model, expressed, models_of
 from camviz_clinic.files.opencv import image_size
 from camviz_clinic.files.output import as_matrix, as_yaml
-from camviz_clinic.files.section import COUNT, Section, as_rotation, explained, named
+from camviz_clinic.files.section import COUNT, Section, as_rotation, explained, named, without_zeros
 
 TITLE = "ROS CameraInfo"
 MATRIX, DISTORTION = ("camera_matrix", "K", "k"), ("distortion_coefficients", "D", "d")
@@ -128,19 +129,34 @@ def _lens(section: Section) -> Lens:
     if values.size == len(names):
         values = np.array(section.vector(key, [len(names)], " ".join(names)))
     else:
-        error = _wrong_count(section, key, model, values.size)
-        if model.lens is KannalaBrandt or values.size not in (4, 5, 8):
+        error = _wrong_count(section, key, model, values)
+        if model.lens is KannalaBrandt or values.size not in (4, 5, 8, 12, 14):
             raise error
         section.mend(error)
     with explained(section.where(key)):
         return KannalaBrandt(*values) if model.lens is KannalaBrandt else BrownConrady.from_coefficients(values)
 
 
-def _wrong_count(section: Section, key: str, model: Model, count: int) -> CalibrationError:
-    fitting = "".join(f"; {count} belong to {other.name}" for other in MODELS if len(other.names) == count + 4)
-    names = model.names[4:]
+def _wrong_count(section: Section, key: str, model: Model, values: Array) -> CalibrationError:
+    names, count = model.names[4:], values.size
     expected = f"{len(names)} numbers ({' '.join(names)}) for {model.name}"
-    return section.error(key, expected, f"{count}{fitting}", COUNT, count)
+    return section.error(key, expected, f"{count}", COUNT, count, _as_many(model, values))
+
+
+def _as_many(model: Model, values: Array) -> str:
+    """What gives a model as many coefficients as it has, in sentences."""
+    others = [other.name for other in MODELS if len(other.names) == values.size + 4]
+    if shorter := without_zeros(values, [len(model.names) - 4]):
+        return f"{shorter} If all {values.size} count, write {others[0]}." if others else shorter
+    if values.size == 4:
+        brown = "" if model.name == "plumb_bob" else "write plumb_bob and "
+        said = f"If they are k1 k2 p1 p2, {brown}add k3 = 0 as the fifth number. "
+        return f"{said}If cv2.fisheye made them, write equidistant."
+    if others:
+        return f"Write {others[0]} as the name of the model."
+    return (
+        "Keep the camera in OpenCV's YAML, which has all of these terms, or solve again with 8 (rational_polynomial)."
+    )
 
 
 def _notes(section: Section) -> tuple[str, ...]:

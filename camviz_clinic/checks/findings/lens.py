@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from math import cos, degrees, inf, isfinite, pi, radians
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -23,7 +24,9 @@ from camviz.distortion import (
 from camviz.distortion.limits import NEARLY_A_POLE
 from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array, Lens, on_plane
+from camviz.lenses.declarations import Fold
 from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.enumeration import enumerated
 from camviz_clinic.calibration.types import Calibration
 from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.registry import Finding, Rng, finding
@@ -32,6 +35,7 @@ from camviz_clinic.checks.virtual import alone, healthy
 LOST = 0.01  # of the pixels, fewer than which may fold
 MAX_FOLDED_BEYOND_CORNERS = 0.1  # of the pixels: a fold that takes more is a fault, wherever corners were seen
 CLOSE_PX = 0.5  # how well a pixel must return from OpenCV's inverse
+STEPS = (100, 1000)  # of OpenCV's inverse, tried in this order
 NEARLY_SIDEWAYS = cos(radians(85))  # beyond, a ray has no point on the plane z = 1 worth the name
 
 
@@ -71,8 +75,7 @@ def _fold(evidence: Evidence, name: str, camera: Camera) -> Iterator[Finding]:
     seen = corners is not None and not _corners_lost(evidence, name, camera) and lost <= MAX_FOLDED_BEYOND_CORNERS
     beyond = turn.angle >= pi / 2 and not _corners_lost(evidence, name, camera)
     severity = "note" if beyond or seen or lost < LOST else fold.severity
-    remedy = f"{_fewer_terms(lens)}, and solve again with more views that reach the border."
-    yield fold.found(sentence, turn.radius, turn.unit, name, severity=severity, remedy=remedy)
+    yield fold.found(sentence, turn.radius, turn.unit, name, severity=severity, remedy=_unfolded(camera, turn))
 
 
 def _lost(camera: Camera) -> float:
@@ -89,10 +92,20 @@ def _ends_before_pole(lens: Lens) -> bool:
     return isinstance(lens, BrownConrady) and lens.cancelled_radius <= lens.limit_radius < inf
 
 
-def _fewer_terms(lens: Lens) -> str:
-    """What to do without, in the terms of this lens: its last radial one that is not 0."""
+def _unfolded(camera: Camera, turn: Fold) -> str:
+    """What takes the fold out of the image: the fewest radial terms without which there is none, each choice tried."""
+    lens: Any = camera.lens
     used = [name for name in lens.parameters() if name.startswith("k") and getattr(lens, name)]
-    return f"Fix {used[-1]} to 0" if len(used) > 1 else "Take a model with other terms"
+    for count in range(1, len(used)):
+        left_out = tuple(used[-count:])
+        without = replace(camera, lens=replace(lens, **dict.fromkeys(left_out, 0.0)))
+        if _seen(without, border_pixels(without)).all():
+            return f"Fix {enumerated(left_out)} to 0, and solve again with more views that reach the border."
+    radius = turn.image * min(camera.intrinsics.fx, camera.intrinsics.fy)
+    return (
+        "Solve again with more views that reach the border, with all of the model's radial terms. "
+        f"Until then use only pixels within {radius:.0f} px of the principal point."
+    )
 
 
 def _where(camera: Camera) -> str:
@@ -205,7 +218,7 @@ def inverse_not_converged(evidence: Evidence) -> Iterator[Finding]:
     if not known:
         raise NotChecked("OpenCV's undistortPoints is not for these lenses")
     for name, camera in known.items():
-        error = default_round_trip(camera)
+        error = round_trip(camera)
         if not error <= CLOSE_PX:
             off = f"{error:.2g} px" if error < 1000 else "more than 1000 px"
             fisheye = _opencv_model(camera.lens) == "cv2.fisheye"
@@ -213,13 +226,24 @@ def inverse_not_converged(evidence: Evidence) -> Iterator[Finding]:
             sentence = f"{name}: {called} without criteria leaves points at the border {off} off."
             said = {
                 "causes": (f"{called}, which stops after a few iterations unless it is told otherwise",),
-                "remedy": inverse_not_converged.remedy.replace("undistortPoints", called, 1),
+                "remedy": _converging(camera, called),
             }
             yield inverse_not_converged.found(sentence, min(error, 1e6), "px", name, **said)
 
 
-def default_round_trip(camera: Camera) -> float:
-    """The largest distance in pixels between a border pixel and its return from OpenCV's inverse with its defaults."""
+def _converging(camera: Camera, called: str) -> str:
+    """The fewest of some iterations that bring OpenCV's inverse home in this camera, each tried."""
+    steps = next((each for each in STEPS if round_trip(camera, each) <= CLOSE_PX), None)
+    if steps is None:
+        return f"{called} does not converge here. Use camera.unproject of camviz.load, or the maps of camviz lut."
+    return inverse_not_converged.remedy.replace("undistortPoints", called, 1).replace("100", str(steps))
+
+
+def round_trip(camera: Camera, steps: int | None = None) -> float:
+    """The largest distance in pixels between a border pixel and its return from OpenCV's inverse.
+
+    OpenCV takes so many `steps`, or its default criteria.
+    """
     intrinsics, lens = camera.intrinsics, camera.lens
     pixels = border_pixels(camera)
     forward = lens.unproject(intrinsics.from_pixels(pixels))[..., 2]  # NaN where the lens folds
@@ -227,7 +251,7 @@ def default_round_trip(camera: Camera) -> float:
     if not len(pixels):
         return 0.0
     with np.errstate(all="ignore"):
-        back = INVERSES[_opencv_model(lens)](camera, pixels)
+        back = INVERSES[_opencv_model(lens)](camera, pixels, steps)
         error = float(np.linalg.norm(back - pixels, axis=-1).max())
     return error if isfinite(error) else 1e6
 
@@ -237,15 +261,23 @@ def _opencv_model(lens: Lens) -> str:
     return next((each.model for each in lens.spellings if each.program == "opencv"), "")
 
 
-def _calib3d_and_back(camera: Camera, pixels: Array) -> Array:
+def _criteria(steps: int | None) -> dict[str, Any]:
+    return {} if steps is None else {"criteria": (cv2.TERM_CRITERIA_MAX_ITER | cv2.TERM_CRITERIA_EPS, steps, 1e-9)}
+
+
+def _calib3d_and_back(camera: Camera, pixels: Array, steps: int | None) -> Array:
     K, coefficients = camera.intrinsics.K, np.array(_values(camera.lens))
-    ideal = cv2.undistortPoints(pixels.reshape(-1, 1, 2), K, coefficients).reshape(-1, 2)
+    if steps is not None and hasattr(cv2, "undistortPointsIter"):  # what OpenCV 4 calls it with criteria
+        ideal = cv2.undistortPointsIter(pixels.reshape(-1, 1, 2), K, coefficients, None, None, **_criteria(steps))
+    else:
+        ideal = cv2.undistortPoints(pixels.reshape(-1, 1, 2), K, coefficients, **_criteria(steps))
+    ideal = ideal.reshape(-1, 2)
     return camera.intrinsics.to_pixels(camera.lens.project_unchecked(on_plane(ideal)))
 
 
-def _fisheye_and_back(camera: Camera, pixels: Array) -> Array:
+def _fisheye_and_back(camera: Camera, pixels: Array, steps: int | None) -> Array:
     K, coefficients = camera.intrinsics.K, np.array(_values(camera.lens))
-    ideal = cv2.fisheye.undistortPoints(pixels.reshape(-1, 1, 2), K, coefficients)
+    ideal = cv2.fisheye.undistortPoints(pixels.reshape(-1, 1, 2), K, coefficients, **_criteria(steps))
     return cv2.fisheye.distortPoints(ideal.reshape(-1, 1, 2), K, coefficients).reshape(-1, 2)
 
 
@@ -253,7 +285,7 @@ def _values(lens: Lens) -> list[float]:
     return [getattr(lens, name) for name in lens.parameters()]
 
 
-INVERSES: dict[str, Callable[[Camera, Array], Array]] = {
+INVERSES: dict[str, Callable[[Camera, Array, int | None], Array]] = {
     "distortion_coefficients": _calib3d_and_back,
     "cv2.fisheye": _fisheye_and_back,
 }
