@@ -321,6 +321,13 @@ def _rotations_and_others(rng: np.random.Generator) -> list[Array]:
         _rotation(rng) @ np.diag([1.2, 1 / 1.2, 1.0]),
         _rotation(rng) @ np.diag([1 + 2.5e-6, 1 - 2.5e-6, 1.0]),  # five times as far off as is allowed
         (1 + 2e-7) * _rotation(rng),  # 4e-7 and 6e-7 off, which is allowed
+        (1 + 3.3e-7) * _rotation(rng),  # the determinant is 0.99e-6 off
+        (1 - 3.3e-7) * _rotation(rng),
+        _rotation(rng) @ np.diag([1 + 4.95e-7, 1 - 4.95e-7, 1.0]),  # the squares of lengths are 0.99e-6 off
+        _rotation(rng) @ np.diag([1 + 5.1e-7, 1 - 4.9e-7, 1.0]),  # 1.02e-6 in one of them
+        _rotation(rng) @ np.diag([1 + 4.9e-7, 1 - 5.1e-7, 1.0]),
+        _leaning(rng, float(rng.choice([-1, 1])) * 0.99e-6),
+        _leaning(rng, float(rng.choice([-1, 1])) * 1.02e-6),
         _leaning(rng, float(rng.uniform(2e-7, 4e-7))),  # as single precision leaves a rotation
         _leaning(rng, float(rng.uniform(6e-6, 9e-6))),
         _leaning(rng, -float(rng.uniform(6e-6, 9e-6))),

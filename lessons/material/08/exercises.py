@@ -659,6 +659,15 @@ def _left_right_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     yield left, right, tolerance
     yield _each_column_by_itself(rng, 50)
     yield from _whole_disparities_of_either_sign(rng)
+    yield _partners_that_rounding_decides(rng, 12)
+
+
+def _partners_that_rounding_decides(rng: np.random.Generator, n: int) -> Arguments:
+    """Partners within half a column of the first and of the last one, on either side of it."""
+    left, right = rng.uniform(-0.45, 0.45, (2, n))
+    left[[0, 1, -2, -1]] = rng.uniform(0.1, 0.4), 1 + rng.uniform(0.6, 0.9), -1 - rng.uniform(0.6, 0.9), -0.3
+    right[[0, -1]] = left[[0, -1]]
+    return left, right, 3.0
 
 
 def _whole_disparities_of_either_sign(rng: np.random.Generator) -> Iterator[Arguments]:
