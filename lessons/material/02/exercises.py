@@ -532,11 +532,6 @@ def near_limit_alone(f, N, s, c):
     return limits(f, N, s, c)[0]
 
 
-@LIMITS.wrong("Both limits have come back in one array. Return them as two: `return near, far`, without `np.array`.")
-def both_in_one_array(f, N, s, c):
-    return np.array(limits(f, N, s, c))
-
-
 @LIMITS.wrong("The condition is the wrong way round: there is a far limit while s < H, and none from H on.")
 def condition_turned_round(f, N, s, c):
     H = f**2 / (N * c) + f
