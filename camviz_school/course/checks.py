@@ -383,9 +383,7 @@ def _in_shape(index: int, like: Arguments, arguments: Arguments) -> Arguments:
     )
 
 
-def _turns_out(
-    exercise: Exercise, function: Function, arguments: Arguments, fits: bool, patience: Patience
-) -> bool:
+def _turns_out(exercise: Exercise, function: Function, arguments: Arguments, fits: bool, patience: Patience) -> bool:
     """Whether the function is right, or wrong, for arguments of which the reference may not know what to make."""
     try:
         exercise.answer(arguments)

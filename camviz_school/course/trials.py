@@ -408,9 +408,7 @@ def _compared(exercise: Exercise, trial: Trial, result: Any, patience: Patience)
 
 def _is_stack(result: Any, expected: tuple[Array, ...]) -> bool:
     """Whether one array has all answers, one after the other along its first axis."""
-    return isinstance(result, np.ndarray) and all(
-        result.shape == (len(expected), *part.shape) for part in expected
-    )
+    return isinstance(result, np.ndarray) and all(result.shape == (len(expected), *part.shape) for part in expected)
 
 
 def _shape_complaint(exercise: Exercise, trial: Trial, shapes: list[tuple[int, ...]]) -> str:

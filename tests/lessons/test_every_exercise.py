@@ -109,7 +109,7 @@ def test_a_plain_method_is_precise_enough(name, function):
 
 
 def _first_off(answer, _):
-    """The first number a tenth off, or the other way round for True and False, or a number in place of the first NaN."""
+    """The first number a tenth off, or the other way round for True and False, or a number in place of NaN."""
     answer = answer.astype(np.float64)
     first = np.nan_to_num(answer.flat[0], posinf=0)
     answer.flat[0] = 1 - first if first in (0, 1) else first * 1.1 + 0.1
@@ -167,23 +167,19 @@ def shapes_of(one, index):
     return [np.shape(arguments[index]) for arguments in cases_of(one)]
 
 
+def right_in_one_shape(one, index):
+    first = shapes_of(one, index)[0]
+    return changed(one, lambda answer, given: answer if np.shape(given[index]) == first else _first_off(answer, given))
+
+
 @EACH
 def test_a_shape_is_named_where_it_is_the_cause(one):
-    varied = [index for index in range(len(one.parameters)) if len(set(shapes_of(one, index))) > 1]
-    if not varied:
-        pytest.skip("all arguments keep their shapes")
-    for index in varied:
-        first = shapes_of(one, index)[0]
-        answer = verdict(one, changed(one, lambda a, given: _first_off(a, 0) if np.shape(given[index]) != first else a))
-        assert answer.status == "wrong"
-        if "It is right when" in answer.message:
-            names = [one.parameters[i] for i in varied if shapes_of(one, i)[0] in _told(answer.message)]
-            assert any(f"It is right when `{name}` has shape" in answer.message for name in names)
-
-
-def _told(message):
-    """The shapes that a message calls right."""
-    return [eval(shape) for shape in message.split("has shape ")[1].split(", but")[0].split(" or ")]
+    """Where points come alone, in a list and in a grid."""
+    varied = [index for index in range(len(one.parameters)) if len({len(s) for s in shapes_of(one, index)}) > 2]
+    if not varied or one.name == "13.response":
+        pytest.skip("no argument comes alone, in a list and in a grid, or the number of wavelengths changes with it")
+    message = verdict(one, right_in_one_shape(one, varied[0])).message
+    assert f"It is right when `{one.parameters[varied[0]]}` has shape {shapes_of(one, varied[0])[0]}, but" in message
 
 
 @EACH
@@ -303,9 +299,10 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("kind", HOSTILE)
-def test_a_hostile_answer_is_refused_in_words_that_can_be_shown(kind):
+def test_a_hostile_answer_is_refused_in_words_that_can_be_shown(kind, thorough):
+    """In every fourth exercise, and in all with --all."""
     kept = np.isclose, np.allclose, np.array_equal, sys.getrecursionlimit(), sys.stdout
-    for one in ALL:
+    for one in ALL if thorough else ALL[::4]:
         answer = verdict(one, HOSTILE[kind])
         assert answer.status in ("wrong", "unsolved"), f"{one.name}: {answer!r}"
         f"{answer!r}{answer._repr_html_()}".encode()
@@ -324,7 +321,7 @@ def test_a_library_s_not_implemented_error_is_no_stub():
 
 
 @pytest.mark.parametrize("when", ["before", "within"])
-def test_a_low_limit_of_recursion_lets_nothing_out(when):
+def test_a_low_recursion_limit_lets_nothing_out(when):
     """In a process of its own: the limit may not be lower than the calls that lead to it."""
     code = f"""
 import sys

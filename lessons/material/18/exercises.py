@@ -654,7 +654,9 @@ def _all_points_count(function: Function, rng: np.random.Generator) -> str:
     if unused is not None:
         return f"Your P does not change when pixel {unused} of 20 moves. With noise every point is needed."
     ratio = error_ratio(function, camera_matrix, noisy, lambda P, number: _pixel_error(P, *true[number]))
-    return "" if ratio < 2 else f"Your P is right for exact pixels. With noise its error is {ratio:.1f} times that of all."
+    return (
+        "" if ratio < 2 else f"Your P is right for exact pixels. With noise its error is {ratio:.1f} times that of all."
+    )
 
 
 def _pixel_error(P: Array, points: Array, pixels: Array) -> float:

@@ -163,7 +163,9 @@ def _all_matches_count(function: Function, rng: np.random.Generator) -> str:
     if unused is not None:
         return f"Your H does not change when match {unused} of 20 moves. With noise every match is needed."
     ratio = error_ratio(function, homography, noisy, lambda H, number: _pixel_error(H, *true[number]))
-    return "" if ratio < 2 else f"Your H is right for exact pixels. With noise its error is {ratio:.1f} times that of all."
+    return (
+        "" if ratio < 2 else f"Your H is right for exact pixels. With noise its error is {ratio:.1f} times that of all."
+    )
 
 
 def _pixel_error(H: Array, uv: Array, to: Array) -> float:
