@@ -298,10 +298,10 @@ def _misplaced_nan(exercise: Exercise, wrong: Sequence[Trial]) -> str:
     if not exercise.close(actual, expected)[~either].all():
         return ""
     for trial in wrong:
-        actual, expected = np.isnan(_joined([trial.actual])), np.isnan(_joined([trial.expected]))
-        if (expected & ~actual).any():
+        no_answer, no_number = np.isnan(_joined([trial.expected])), np.isnan(_joined([trial.actual]))
+        if (no_answer & ~no_number).any():
             return f"Some of these inputs have no answer, and then NaN is wanted: {exercise.call(trial.arguments)}."
-        if (actual & ~expected).any():
+        if (no_number & ~no_answer).any():
             return f"Your function gives NaN where there is an answer: {exercise.call(trial.arguments)}."
     return ""
 

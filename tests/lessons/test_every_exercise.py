@@ -334,8 +334,10 @@ def right(*arguments):
     return one.reference(*arguments)
 if {when == "before"}:
     sys.setrecursionlimit(60)
+def as_deep_as_a_cell(function, depth=42):
+    return as_deep_as_a_cell(function, depth - 1) if depth else judge(one, function)
 for function in (right, lambda *arguments: 1 / 0, lambda *arguments: "x"):
-    print(judge(one, function).status)
+    print(as_deep_as_a_cell(function).status)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout.split() == ["correct", "wrong", "wrong"], done.stderr
