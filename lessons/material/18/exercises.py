@@ -11,6 +11,8 @@ import cv2
 import numpy as np
 
 from camviz_school.course.checks import SHAPES, Arguments, Array, Exercise
+from camviz_school.course.laws import error_ratio, unused_row
+from camviz_school.course.trials import Function
 
 NOWHERE = np.full(2, np.nan)
 
@@ -416,6 +418,7 @@ ANY_HEIGHT = Exercise(
     name="18.any_height",
     reference=any_height,
     cases=_tilted,
+    any_numbers=False,
     hints=(
         "The equation gives camera heights up to a factor that is the same for staff and door. What do you divide?",
         "Write the right side as a function of one foot and top, each with a third number 1. Call it twice.",
@@ -630,13 +633,35 @@ def camera_matrix(points: Array, pixels: Array) -> Array:
 
 
 def _six_points(rng: np.random.Generator) -> Iterator[Arguments]:
-    for n in (6, 6, 9, 20):
+    return _cameras(rng, 6, 6, 9, 20)
+
+
+def _cameras(rng: np.random.Generator, *numbers: int) -> Iterator[Arguments]:
+    for n in numbers:
         K, R, _ = _camera(rng)
         K[:2, 2] -= 1500 if n == 9 else 0  # cropped
         K[0, 1], K[1, 1] = rng.uniform(-20, 20), K[1, 1] * rng.uniform(0.8, 1.2)
         points = rng.uniform(-2, 2, (n, 3))
         x = (points - R.T @ [0.3, -0.4, -6.0] * rng.uniform(0.8, 1.2)) @ (K @ R).T
         yield points, x[:, :2] / x[:, 2:]
+
+
+def _all_points_count(function: Function, rng: np.random.Generator) -> str:
+    """With noise every point counts, and the error is that of all points."""
+    true = [next(_cameras(rng, 20)) for _ in range(8)]
+    noisy = [(points, pixels + rng.normal(0, 0.5, pixels.shape)) for points, pixels in true]
+    unused = unused_row(function, noisy[0], _up_to_scale)
+    if unused is not None:
+        return f"Your P does not change when pixel {unused} of 20 moves. With noise every point is needed."
+    ratio = error_ratio(function, camera_matrix, noisy, lambda P, number: _pixel_error(P, *true[number]))
+    return (
+        "" if ratio < 2 else f"Your P is right for exact pixels. With noise its error is {ratio:.1f} times that of all."
+    )
+
+
+def _pixel_error(P: Array, points: Array, pixels: Array) -> float:
+    x = np.column_stack([points, np.ones(len(points))]) @ P.T
+    return float(np.sqrt(np.mean((x[:, :2] / x[:, 2:] - pixels) ** 2)))
 
 
 def _up_to_scale(P: Array) -> Array:
@@ -650,8 +675,10 @@ CAMERA_MATRIX = Exercise(
     name="18.camera_matrix",
     reference=camera_matrix,
     cases=_six_points,
+    any_numbers=False,
     tolerance=1e-6,
     canonical=_up_to_scale,
+    laws=(_all_points_count,),
     hints=(
         "Each point gives two rows of twelve numbers. The twelve numbers of P make all rows 0.",
         "Stack the rows (X, 0, −uX) and (0, X, −vX), X with its 1. `np.linalg.svd(A)[2][-1]` is the unit vector that "
