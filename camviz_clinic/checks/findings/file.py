@@ -106,7 +106,7 @@ def zero_matrix(rng: Rng, strength: float) -> Evidence:
 
 def _refused(solved: Calibration, K: list[float]) -> Evidence:
     """The numbers of a camera alone, beside why a file with this K is refused."""
-    tree = yaml.safe_load(ros.write(solved))
+    tree = yaml.safe_load(ros.write_one(solved))
     tree["camera_matrix"]["data"] = K
     try:
         return as_file(yaml.safe_dump(tree))
