@@ -36,7 +36,7 @@ def residuals(
     scale: float = 100,
     **options: Any,
 ) -> Any:
-    """Arrows from every detected corner towards its projection.
+    """Arrows from where every used corner is projected towards where it was detected.
 
     Args:
         calibration: With corners and poses.
@@ -57,7 +57,7 @@ def residuals(
     seen = Observations.of(calibration, camera)
     used = seen.used & _chosen(view, len(seen))[:, None]
     ax = image_axes(seen.camera.intrinsics, ax)
-    starts, arrows = seen.detections[used], -scale * seen.residuals[used]
+    starts, arrows = seen.projected[used], scale * seen.residuals[used]
     _quiver(ax, starts, arrows, **options)
     ax.set_title(f"residuals × {scale:g}, {_rms(seen.lengths[used]):.3g} px RMS")
     return ax

@@ -237,6 +237,19 @@ def test_corners_and_photographs_of_other_shapes_are_refused_by_name():
         CalibrationView.of(corners, Board(9, 6, 0.025), 640, 480, (np.zeros((480, 640, 3), np.uint8),))
 
 
+def test_vectors_lead_from_projected_to_detected_corners():
+    view = CalibrationView(picked=2)
+    pose, lens, k = view.estimated_poses[1], view.camera.lens, view.camera.intrinsics
+    distortion = np.array([lens.k1, lens.k2, lens.p1, lens.p2, lens.k3])
+    corners = view.board.corners
+    projected = cv2.projectPoints(corners, pose.rotation.as_rotvec(), pose.translation, k.K, distortion)[0][:, 0]
+    ends = projected + view.magnified * (view.corners[1] - projected)
+    data = re.findall(r'<path d="([^"]*)" class="red"', view._vectors(view._image_panel))[0]
+    drawn = [list(map(float, one)) for one in re.findall(r"M([-\d.]+),([-\d.]+)L([-\d.]+),([-\d.]+)", data)]
+    place = view._image_panel.place
+    np.testing.assert_allclose(drawn, np.hstack([place(projected), place(ends)]), atol=0.06)
+
+
 def test_the_thirteen_photographs_have_one_bad_column_of_corners():
     """RMS 0.408 as OpenCV's tutorials have it, 1.22 in left02, whose first column is off; 0.234 without it."""
     folder = Path(os.environ.get("CAMVIZ_SAMPLES", "")) / "opencv-samples"

@@ -13,6 +13,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz import twoview
 from camviz.cameras import Camera, Intrinsics, transform
+from camviz.draw.panel import Panel
 from camviz.lenses import BrownConrady, KannalaBrandt
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.uncertainty import projection_uncertainty
@@ -120,7 +121,7 @@ def heights(panel, marks, classes):
 
 
 @pytest.mark.parametrize("scale", [1.0, 40.0])
-def test_an_arrow_leads_from_a_corner_towards_its_projection_at_the_stated_scale(scale):
+def test_an_arrow_leads_from_projected_to_detected_at_its_scale(scale):
     view = ResidualsView.of(single()).but(view=2, scale=scale)
     panel = view._image_panel
     body, _ = view.picture_panel(panel)
@@ -130,9 +131,44 @@ def test_an_arrow_leads_from_a_corner_towards_its_projection_at_the_stated_scale
     lens = view.observations.camera.lens
     D = np.array([lens.k1, lens.k2, lens.p1, lens.p2, lens.k3])
     projected = cv2.projectPoints(BOARD.corners, rvec, t, view.observations.camera.intrinsics.K, D)[0].reshape(-1, 2)
-    ends = detected + scale * (projected - detected)
-    np.testing.assert_allclose(shafts, np.hstack([panel.place(detected), panel.place(ends)]), atol=0.06)
+    ends = projected + scale * (detected - projected)
+    np.testing.assert_allclose(shafts, np.hstack([panel.place(projected), panel.place(ends)]), atol=0.06)
     assert any(f"residuals × {scale:g}" in text.words for text in body.texts())
+
+
+def test_a_corner_detected_1_px_to_the_right_has_residual_plus_1():
+    """In the numbers, and in every drawing an arrow to the right that ends on the detected corner."""
+    exact = perfect()
+    right = replace(exact, detections=exact.detections + (1.0, 0.0))
+    known = right.used[0]
+    np.testing.assert_allclose(right.residuals[0][known], np.tile([1.0, 0.0], (known.sum(), 1)), atol=1e-9)
+    picture, worst = ResidualsView(right, scale=20.0), OutliersView(right, patch=24.0)
+    arrow = drawn(picture.picture_panel(picture._image_panel)[0], "orange")[: known.sum()]
+    along = np.broadcast_to((20 * picture._image_panel.scale[0], 0), (known.sum(), 2))
+    np.testing.assert_allclose(arrow[:, 2:] - arrow[:, :2], along, atol=0.11)
+    view, corner = worst.worst[0]
+    detail, _ = worst._detail(0, view, corner, None, 0.0, 0.0)
+    middle = np.round(right.detections[view, corner])
+    ends = np.array([exact.detections[view, corner], right.detections[view, corner]]) - middle + 12
+    np.testing.assert_allclose(drawn(detail, "orange thick")[0], (138 / 24 * ends).ravel(), atol=0.06)
+    means = RadiusView(right).cells[1]
+    means = means[np.isfinite(means[:, 0])]
+    np.testing.assert_allclose(means, np.broadcast_to((1.0, 0.0), means.shape), atol=1e-9)
+
+
+def test_a_corner_seen_to_the_right_on_the_board_has_an_arrow_right():
+    view = ResidualsView(perfect(BOARD.corners + [0.001, 0, 0]))
+    arrow = drawn(view.board_panel(Panel("board", 0, 0, 450, 180, 0, 1, 0, 1)), "orange")[:54]
+    assert (arrow[:, 2] - arrow[:, 0] > 1).all()
+    np.testing.assert_allclose(arrow[:, 3], arrow[:, 1], atol=0.11)
+
+
+def test_a_corner_below_its_epipolar_line_has_an_offset_downwards():
+    calibration = pair(noise=0.0)
+    lower = calibration.detections | {"right": calibration.detections["right"] + (0.0, 1.0)}
+    left, right = SharedViews.of(replace(calibration, detections=lower)).offsets
+    assert np.nanmin(right[..., 1]) > 0.5
+    assert np.nanmax(left[..., 1]) < -0.5
 
 
 def test_corners_set_aside_have_crosses_and_no_say():

@@ -105,7 +105,7 @@ def test_pycolmap_reads_the_model_to_a_billionth_of_a_pixel(scene):
         X = POINTS @ cam_from_world[:3, :3].T + cam_from_world[:3, 3]
         uv = (X / X[:, 2:]) @ held["K"].T
         image = images[name]
-        assert image.camera.model.name == "PINHOLE"
+        assert image.camera.model.name == "SIMPLE_PINHOLE"  # as the pixels are square
         theirs = image.camera.img_from_cam(image.cam_from_world() * POINTS)
         assert np.abs(theirs - 0.5 - uv[:, :2]).max() < 1e-9
 
@@ -124,6 +124,20 @@ def test_transforms_are_nerfstudios_by_its_own_equations(scene):
         true = POINTS @ cam_from_world[:3, :3].T + cam_from_world[:3, 3]
         uv = (true / true[:, 2:]) @ held["K"].T
         assert np.abs(np.column_stack([u, v]) - 0.5 - uv[:, :2]).max() < 1e-9
+
+
+def test_what_the_commands_write_inspects_as_healthy(scene, capsys, monkeypatch):
+    """calibrate, undistort, dataset and convert, of photographs of a healthy camera."""
+    monkeypatch.chdir(scene.folder)
+    assert main(("calibrate", "photos", *OPTIONS, "-o", "camera.yaml")) == 0
+    assert main(("undistort", "camera.yaml", "photos", "-o", "flat")) == 0
+    assert main(("convert", "camera.yaml", "camera_info.yaml", "--to", "ros")) == 0
+    assert main(("convert", "flat/camera.yaml", "flat.json", "--to", "nerfstudio")) == 0
+    own = [f"out/{name}" for name in ("camera.yaml", "photographs.yaml", "transforms.json", "sparse/0")]
+    for path in ("camera.yaml", "flat/camera.yaml", "camera_info.yaml", "flat.json", *own):
+        capsys.readouterr()
+        assert main(("inspect", path)) == 0
+        assert capsys.readouterr().out.startswith("Nothing wrong was found"), path
 
 
 def test_the_camera_as_it_took_the_photographs_is_kept_with_its_corners(scene):

@@ -24,7 +24,16 @@ from camviz.distortion import (
     valid_region,
     weakest_denominator,
 )
-from camviz.lenses import BrownConrady, DoubleSphere, Equidistant, KannalaBrandt, Perspective, UnifiedSphere
+from camviz.lenses import (
+    BrownConrady,
+    DoubleSphere,
+    Equidistant,
+    KannalaBrandt,
+    Perspective,
+    Scaramuzza,
+    UnifiedSphere,
+)
+from camviz.lenses.brown_conrady import MAX_CANCELLED_GAP
 
 # The two cameras of OpenCV's samples/data/intrinsics.yml (M1 D1, M2 D2), pictures of 640×480.
 PUBLISHED = {
@@ -133,6 +142,96 @@ def test_a_pole_is_a_root_of_the_denominator_and_a_near_pole_almost_one():
     assert weakest_denominator(Perspective(), 3) == (0, 1)
     # D = 1 - 8 s + 20 s² is least at s = 0.2, close to the axis: 0.2 there
     assert weakest_denominator(BrownConrady(k4=-8, k5=20), 3) == pytest.approx((sqrt(0.2), 0.2))
+
+
+CANCELLED = BrownConrady(
+    *(-2.8247717583453804, -0.8007807076436804, -0.014595359484103326, 0.0018820998949700702, 1.9827795585249783),
+    *(-2.7306773773930897, -1.217725820479524, 2.4052243546080136),
+    *(-0.0020670359760441713, 3.466088079317406e-05, 0.014100351510458799, -3.093532973620761e-05),
+)
+"""A calibration that was reported as faulty: N and D have roots at r = 0.5910499 and 0.5910491."""
+
+
+def cancelling(pole, gap, extra=0.1):
+    """N/D = (1 - s/((1 + gap) pole²)) (1 + extra s) / (1 - s/pole²): a pole that a root of N almost cancels."""
+    zero = 1 / ((1 + gap) * pole**2)
+    return BrownConrady(k1=extra - zero, k2=-extra * zero, k4=-1 / pole**2)
+
+
+def test_the_first_root_of_several_is_that_of_numpy():
+    """Of a cubic in r² with three positive roots, and of the reported calibration."""
+    a, b, c = 0.9, 0.35, 2.0
+    D = np.polynomial.polynomial.polyfromroots([a, b, c])
+    assert pole_radius(BrownConrady(*[0] * 5, *(D[1:] / D[0]))) == pytest.approx(sqrt(b), rel=1e-12)
+    roots = np.roots([2.4052243546080136, -1.217725820479524, -2.7306773773930897, 1])
+    assert pole_radius(CANCELLED) == pytest.approx(sqrt(roots[roots > 0].min()), rel=1e-12)
+    assert pole_radius(CANCELLED) == pytest.approx(0.5910491, abs=1e-7)
+    twice = BrownConrady(k1=-1, k2=0.3, k3=-0.01)  # falls, rises and falls again
+    slope = np.poly1d([-0.07, 1.5, -3, 1])
+    assert fold_radius(twice) == pytest.approx(sqrt(slope.roots.real.min()), rel=1e-12)
+    assert (slope.roots > 0).sum() == 3
+
+
+@pytest.mark.parametrize(("gap", "ends"), [(0.99 * MAX_CANCELLED_GAP, True), (1.01 * MAX_CANCELLED_GAP, False)])
+def test_a_cancelled_pole_ends_a_lens_before_it(gap, ends):
+    lens = cancelling(0.6, gap)
+    assert (lens.cancelled_radius < inf) == ends
+    assert lens.limit_radius == (lens.cancelled_radius if ends else lens.pole_radius)
+
+
+@pytest.mark.parametrize("gap", [1e-8, 1e-6, 1e-4])
+def test_a_cancelled_pole_doubles_the_slope_where_it_ends(gap):
+    """Of log g by log r, against its smooth continuation 1 + 0.1 s; up to there g follows the continuation."""
+    lens, smooth = cancelling(0.6, gap), BrownConrady(k1=0.1)
+    end = lens.cancelled_radius
+    r = end * (1 + np.array([-1e-7, 1e-7]))
+    steeper = np.diff(np.log(lens.radial(r)))[0] - np.diff(np.log(smooth.radial(r)))[0]
+    assert steeper / 2e-7 == pytest.approx(1, rel=3 * sqrt(gap) + 1e-3)
+    assert lens.radial(end) / smooth.radial(end) - 1 == pytest.approx(sqrt(gap / 2), rel=0.05)
+
+
+ENDING = {
+    "cancelled": CANCELLED,
+    "cancelled early": cancelling(0.3, 1e-5),
+    "zero before the pole": cancelling(0.5, -1e-5),
+    "pole": BrownConrady(0.1, 0, 0, 0, 0, -0.8),
+    "folds and returns": BrownConrady(k1=-1, k2=0.3, k3=-0.01),
+    "folds and returns, tangential": BrownConrady(k1=-1, k2=0.9, k3=-0.01, p1=0.01, p2=-0.02),
+    "thin prism": BrownConrady(-0.2, 0.1, 1e-3, -2e-3, 0.01, 0.1, 0, 0, 1e-2, -2e-3, -4e-3, 3e-3),
+    "fisheye folds and returns": KannalaBrandt(-0.3, 0.1, -0.01),
+    "Scaramuzza": Scaramuzza(0.3, -0.6, 0.3),
+}
+
+
+@pytest.mark.parametrize("lens", ENDING.values(), ids=ENDING)
+def test_the_inverse_follows_one_branch_from_the_centre(lens):
+    """Along image rays: no jump, no hole before its end, det J > 0, and where it is radial the dense table's branch."""
+    radius = np.linspace(0, 1.5, 3001)[:, None, None]
+    azimuth = np.linspace(0.1, 2 * pi, 12)
+    rays = lens.unproject(radius * np.stack([np.cos(azimuth), np.sin(azimuth)], axis=-1))
+    seen = np.isfinite(rays[..., 0])
+    assert (np.diff(seen.astype(int), axis=0) <= 0).all()
+    assert seen[100].all()
+    steps = np.linalg.norm(np.diff(rays, axis=0), axis=-1)
+    assert np.nanmax(steps) < 0.03
+    ideal = rays[..., :2] / np.where(rays[..., 2:] > 0.05, rays[..., 2:], np.nan)
+    determinant = jacobian_determinant(lens, ideal[np.isfinite(ideal[..., 0])])
+    assert not (determinant < -1e-9).any()  # NaN next to the end, where it is by differences
+    if isinstance(lens, BrownConrady) and not any((lens.p1, lens.p2, lens.s1)):
+        r = np.linspace(0, 3, 1_000_001)
+        rising = np.concatenate([[True], np.diff(lens.radial(r)) > 0]) & (r < lens.pole_radius)
+        end = len(r) if rising.all() else int((~rising).argmax())
+        table = np.interp(radius[:, 0, 0], lens.radial(r[:end]), r[:end])
+        at = seen[:, 0]
+        np.testing.assert_allclose(np.linalg.norm(ideal[at, 0], axis=-1), table[at], rtol=0, atol=3e-5)
+
+
+def test_a_cancelled_pole_has_no_rays_behind_it():
+    """Pixels (0, 0) and (10, 10) of the reported calibration: by the hairline branch they would be 10 px inwards."""
+    grid = Intrinsics(1440, 1080, 1570.8956145992222, 1570.3494207432338, 744.873376467274, 575.5508745633753)
+    rays = CANCELLED.unproject(grid.from_pixels([[0, 0], [10, 10], [50, 50]]))
+    assert np.isnan(rays[:2]).all()
+    assert np.isfinite(rays[2]).all()
 
 
 def test_the_edge_of_the_field_is_the_fold_or_the_published_limit():

@@ -1,15 +1,18 @@
 """The fault lab and the ward: what is shown of a fault is true, and a diagnosis is answered by what is the case."""
 
+import re
+
 import cv2
 import numpy as np
 import pytest
 
 from camviz.cameras import Camera, Intrinsics
+from camviz.draw.panel import image_in
 from camviz_clinic.calibration.difference import difference
 from camviz_clinic.checks import faults
 from camviz_school.course.material import module
 from camviz_school.views.fault_lab import FaultLabView, grouped
-from camviz_school.views.laboratory import VIEWS, experiment, lab_faults
+from camviz_school.views.laboratory import BOARD, VIEWS, experiment, lab_faults
 from camviz_school.views.ward import COMPLAINTS, HEALTHY, Ward
 
 lesson16 = module("16")
@@ -94,6 +97,20 @@ def test_hidden_findings_are_nowhere_in_the_picture():
     picture = FaultLabView(fault="warped board", strength=1.0, told=False).figure()
     for words in ("board-warp", "bent", "warped"):
         assert words not in picture.svg()
+
+
+def test_arrows_lead_from_projected_to_detected_corners():
+    view = FaultLabView(fault="outlier corner", strength=0.0, view=3, panels="residuals")
+    body = view._image_panel()
+    data = re.findall(r'<path d="([^"]*)" class="orange"', body)[0]
+    shafts = np.array([list(map(float, one)) for one in re.findall(r"M([-\d.]+),([-\d.]+)L([-\d.]+),([-\d.]+)", data)])
+    made, k = view.experiment, view.experiment.camera.intrinsics
+    pose, lens, detected = made.solved.first_from_board[2], made.camera.lens, made.solved.detections["camera"][2]
+    distortion = np.array([lens.k1, lens.k2, lens.p1, lens.p2, lens.k3])
+    projected, _ = cv2.projectPoints(BOARD.corners, pose.rotation.as_rotvec(), pose.translation, k.K, distortion)
+    panel = image_in(view._layout["residuals"], "picture", k.width, k.height)
+    ends = projected[:, 0] + view.arrow_scale * (detected - projected[:, 0])
+    np.testing.assert_allclose(shafts[:54], np.hstack([panel.place(projected[:, 0]), panel.place(ends)]), atol=0.06)
 
 
 def test_clicking_a_bar_chooses_its_view():

@@ -4,7 +4,9 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pytest
 import yaml
@@ -20,6 +22,7 @@ from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.checks import Inspection, inspect, inspect_file, kinds
 from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.fields import smooth_field, warp_columns
+from camviz_clinic.checks.findings import lens as lens_findings
 from camviz_clinic.checks.findings.boards import coverage, held_out_ratio
 from camviz_clinic.checks.observed import explained, parameter_columns
 from camviz_clinic.checks.rig import fits_better
@@ -246,7 +249,7 @@ def test_every_id_has_a_check_and_words_and_is_either_checked_or_skipped_with_a_
     _, calibration = healthy
     assert {id for id, _ in inspect(calibration).skipped} == {
         "models-differ", "contradiction", "near-pole", "baseline-sign", "rectified-black", "inverted-transform",
-        "corner-order", "wrong-board", "interpolated-corners", "other-settings",
+        "corner-order", "wrong-board", "interpolated-corners", "other-settings", "sides-exchanged",
     }  # fmt: skip
 
 
@@ -266,7 +269,7 @@ def test_the_worst_comes_first_and_a_healthy_calibration_says_what_was_checked(h
     _, calibration = healthy
     said = inspect(calibration).as_text()
     assert said.startswith("Good to ±")
-    assert "No problem found; 28 checks ran, 10 could not because the file holds one camera" in said
+    assert "No problem found; 31 checks ran, 11 could not because the file holds one camera" in said
     assert "\nNext: " in said
     assert "\nChecked: assumed-coefficients, assumed-reading, not-a-rotation, bad-k" in said
     K = calibration.cameras["camera"]
@@ -337,11 +340,49 @@ def test_a_transposed_k_is_read_on_as_the_camera_that_was_meant(tmp_path):
         np.testing.assert_allclose(inspection.calibration.cameras["camera"].intrinsics.K, K)
 
 
-def test_a_negative_focal_length_in_k_leaves_nothing_to_look_at(tmp_path):
-    K = np.array([[-500.0, 0, 320], [0, 500, 240], [0, 0, 1]])
-    inspection = inspect_file(write(tmp_path / "k.yml", image_width=640, image_height=480, K=K, D=np.zeros((1, 5))))
-    asked = sum(not kind.asked_of for kind in kinds().values())
-    assert (inspection.calibration, ids(inspection), len(inspection.skipped)) == (None, {"bad-k"}, asked - 1)
+@pytest.mark.parametrize(
+    ("focal", "id", "meaning"),
+    [
+        ((500, -500), "reversed-axis", "the y axis points up (OpenGL)"),
+        ((-500, 500), "reversed-axis", "the x axis points left, or the camera looks along -z"),
+        ((-500, -500), "reversed-axis", "x points left and y up (PyTorch3D)"),
+        ((0, 500), "not-calibrated", "fx = 0: the camera is not calibrated"),
+        ((500, 0), "not-calibrated", "fy = 0: the camera is not calibrated"),
+    ],
+)
+def test_a_focal_length_that_is_not_positive_says_why(tmp_path, focal, id, meaning):
+    """In OpenCV's matrix and in Kalibr's list of four numbers; nothing is left to look at."""
+    (fx, fy), asked = focal, sum(not kind.asked_of for kind in kinds().values())
+    K = np.array([[fx, 0, 320.0], [0, fy, 240], [0, 0, 1]])
+    opencv = write(tmp_path / "k.yml", image_width=640, image_height=480, K=K, D=np.zeros((1, 5)))
+    part = {"camera_model": "pinhole", "intrinsics": [fx, fy, 320, 240], "distortion_model": "none"}
+    kalibr = tmp_path / "chain.yaml"
+    kalibr.write_text(yaml.safe_dump({"cam0": {**part, "distortion_coeffs": [], "resolution": [640, 480]}}))
+    for path in opencv, kalibr:
+        inspection = inspect_file(path)
+        assert (inspection.calibration, ids(inspection), len(inspection.skipped)) == (None, {id}, asked - 1)
+        assert meaning in one(inspection, id).sentence
+
+
+def test_a_camera_matrix_of_zeros_is_not_calibrated(tmp_path):
+    """ROS 2 publishes one until a camera is calibrated."""
+    message = {"height": 720, "width": 1280, "distortion_model": "", "d": [], "k": [0.0] * 9, "p": [0.0] * 12}
+    (tmp_path / "ros.yaml").write_text(yaml.safe_dump(message))
+    assert ids(inspect_file(tmp_path / "ros.yaml")) == {"not-calibrated"}
+
+
+@pytest.mark.parametrize(("focal", "flip"), [((500, -510), [1, -1, 1]), ((-500, 510), [-1, 1, 1])])
+def test_the_remedy_for_a_reversed_axis_is_the_same_camera(focal, flip):
+    """OpenCV projects the points of reversed axes through both: f positive, and p1 (y) or p2 (x) negated."""
+    points = np.array([[0.1, 0.2, 1.0], [-0.3, 0.15, 1.2], [0.25, -0.3, 0.9]])
+    D = np.array([-0.2, 0.05, 2e-3, -3e-3, 0.01])
+    turned = D * ([1, 1, -1, 1, 1] if flip[1] < 0 else [1, 1, 1, -1, 1])
+    K = [np.array([[fx, 0, 320.0], [0, fy, 240], [0, 0, 1]]) for fx, fy in (focal, np.abs(focal))]
+    here, there = (
+        cv2.projectPoints(each, np.zeros(3), np.zeros(3), k, d)[0]
+        for each, k, d in ((points, K[0], D), (points * flip, K[1], turned))
+    )
+    np.testing.assert_allclose(here, there, atol=1e-10)
 
 
 def test_a_rotation_that_is_mended_is_the_nearest_one(tmp_path):
@@ -465,3 +506,77 @@ def test_corners_in_pictures_are_found_for_a_file_without_them(capsys):
     assert main([*words, "--board", "9x6", "--square-mm", "25", "--json"]) == 0
     tree = json.loads(capsys.readouterr().out)
     assert "pose-absorbs-error" in tree["checked"]
+
+
+CANCELLED_YML = """%YAML:1.0
+---
+image_width: 1440
+image_height: 1080
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [1570.8956145992222, 0.0, 744.873376467274, 0.0, 1570.3494207432338, 575.5508745633753, 0.0, 0.0, 1.0]
+distortion_coefficients: !!opencv-matrix
+   rows: 12
+   cols: 1
+   dt: d
+   data: [-2.8247717583453804, -0.8007807076436804, -0.014595359484103326, 0.0018820998949700702, 1.9827795585249783,
+      -2.7306773773930897, -1.217725820479524, 2.4052243546080136, -0.0020670359760441713, 3.466088079317406e-05,
+      0.014100351510458799, -3.093532973620761e-05]
+"""
+
+
+def test_a_near_pole_is_named_at_the_first_zero(tmp_path, monkeypatch, capsys):
+    """Of the denominator of a reported file, at 0.5910; the image ends beyond, at 0.5993. The tables say so too."""
+    monkeypatch.chdir(tmp_path)
+    Path("cancel.yml").write_text(CANCELLED_YML, encoding="utf-8")
+    (found,) = inspect_file(Path("cancel.yml")).findings
+    assert found.id == "near-pole"
+    assert "is 0, which is a pole, at r = 0.5910 focal lengths. The image reaches to 0.5993." in found.sentence
+    assert "Beyond it less than 1 % of the pixels have no ray." in found.sentence
+    assert main(["convert", "cancel.yml", "tables.npz", "--to", "lut"]) == 0
+    assert "warning: camera: 0.05 % of the pixels have no ray; `rays` is NaN there." in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("lost", "severity"), [(0.1, "note"), (0.1001, "fault")])
+def test_a_fold_of_a_tenth_of_the_image_is_a_fault(lost, severity, monkeypatch):
+    """Though no board was seen beyond it."""
+    camera = Camera(Intrinsics(640, 480, 500, 500, 320, 240), BrownConrady(k1=-3.0))
+    middle = np.tile([320.0, 240.0], (1, 54, 1))
+    monkeypatch.setattr(lens_findings, "_lost", lambda camera: lost)
+    evidence = SimpleNamespace(
+        cameras={"camera": camera}, calibration=SimpleNamespace(detections={"camera": middle}), observed={}
+    )
+    (found,) = lens_findings.fold.check(evidence)
+    assert found.severity == severity
+
+
+def test_sides_are_exchanged_where_the_principal_point_fits_so():
+    """The middles of 480×640 and 640×480 are 80√2 px apart: at two thirds of the way the second is half as far."""
+    for by, id in ((1 - 1e-9, "principal-point"), (1 + 1e-9, "wrong-size")):
+        off = 80 * 2 / 3 * by
+        camera = Camera(Intrinsics(480, 640, 535.0, 535.0, 239.5 + off, 319.5 - off), Perspective())
+        assert ids(inspect(camviz_clinic.Calibration({"c": camera}, Path("made"), "made"))) == {id}
+
+
+def test_two_baselines_differ_in_millimetres_and_in_depth():
+    """B 2.1 % longer: at one disparity Z = f B / d is 2.1 % deeper, 21 mm at 1 m and 63 mm at 3 m; 1000 times is mm."""
+    camera = Camera(Intrinsics(640, 480, 535.0, 535.0, 319.5, 239.5), Perspective())
+
+    def pair(baseline):
+        right = camera.at(RigidTransform.from_translation([baseline, 0, 0]))
+        return camviz_clinic.Calibration({"left": camera, "right": right}, Path("made"), "made")
+
+    for at, mm in ((None, 21), (3.0, 63)):
+        inspection = inspect(pair(0.08 * 1.021), compare=pair(0.08), at=at)
+        (apart,) = inspection.pair_differences
+        assert apart.baseline_mm - apart.other_mm == pytest.approx(1.68)
+        assert apart.depth_mm == pytest.approx(mm, rel=1e-6)
+        finding = one(inspection, "baseline-scale")
+        assert "1.7 mm (2.1%) longer than the 80 mm" in finding.sentence
+        assert f"At {at or 1:g} m their depths differ by {mm} mm" in finding.sentence
+        assert "metres taken" not in " ".join(finding.causes)
+    assert one(inspect(pair(80.0), compare=pair(0.08)), "baseline-scale").causes == ("millimetres taken for metres",)
+    near = (math.exp(0.02 * 0.999), math.exp(0.02 * 1.001))
+    assert ["baseline-scale" in ids(inspect(pair(0.08 * r), compare=pair(0.08))) for r in near] == [False, True]

@@ -2,7 +2,9 @@
 
 import json
 import os
-from dataclasses import replace
+import re
+import shlex
+from dataclasses import fields, replace
 from pathlib import Path
 
 import cv2
@@ -150,7 +152,7 @@ def test_a_world_of_ones_own_is_kept_or_refused(tmp_path, name):
         write(from_first_camera(made), tmp_path / "out", name)
 
 
-@pytest.mark.parametrize("name", ["ros", "mrcal", "euroc", "matlab"])
+@pytest.mark.parametrize("name", ["mrcal", "euroc", "matlab"])
 def test_a_format_of_one_camera_asks_which(tmp_path, name):
     with pytest.raises(CalibrationError, match="choose one of cam0, cam1"):
         write(pair(), tmp_path / "out", name)
@@ -193,9 +195,213 @@ def test_opencv_keeps_all_that_it_knows_of_the_views(tmp_path, suffix):
 def test_what_a_format_does_not_hold_beside_the_cameras_is_said(tmp_path):
     lens = LENSES["brown4"]
     made = calibration(Camera(GRID, lens), board=Board(9, 6, 0.025), per_view_errors={"cam0": np.ones(3)}, imu=IMU)
-    renamed, left_out = write(made, tmp_path / "out", "mrcal")
-    assert renamed == "The format does not keep these names: cam0 is camera."
-    assert left_out == "The format does not hold the board, the errors of the views, the place of the IMU: left out."
+    lost = write(made, tmp_path / "out", "mrcal")
+    assert lost == ("the name cam0 (now camera)", "the board", "the errors of the views", "the place of the IMU")
+
+
+def test_every_field_of_a_calibration_is_compared():
+    """But for what is no record of the cameras: where it was read, and what was found in reading."""
+    compared = {"cameras", *writing.KINDS}
+    others = {"source", "format", "notes", "faults", "redundant", "undecided"}
+    assert {field.name for field in fields(Calibration)} == compared | others
+
+
+def test_a_record_that_comes_back_changed_is_named(tmp_path, monkeypatch):
+    made = calibration(Camera(GRID, LENSES["brown5"]), board=Board(9, 6, 0.025), board_warp=np.array([1e-3, 2e-3]))
+    other = replace(made, board=Board(9, 6, 0.024), board_warp=made.board_warp + 1e-8)
+    monkeypatch.setattr(writing, "load", lambda *_, **__: other)
+    assert write(made, tmp_path / "out.yml", "opencv") == ("part of the board", "part of the bend of the board")
+    monkeypatch.setattr(writing, "load", lambda *_, **__: replace(made, board_warp=made.board_warp + 1e-13))
+    assert write(made, tmp_path / "out.yml", "opencv") == ()
+
+
+def test_an_image_size_that_a_format_does_not_hold_is_named(tmp_path):
+    assert write(calibration(Camera(GRID)), tmp_path / "calib.txt", "kitti") == (
+        "the image size (640×480 px)",
+        "the name cam0 (now P0)",
+    )
+
+
+# Pairs and rigs.
+
+
+ASIDE = RigidTransform.from_components([0.06, 0.002, -0.003], Rotation.from_rotvec([0.01, -0.02, 0.005]))
+RIGS = {
+    "pair": pair(LENSES["brown4"]).cameras,
+    "side by side": {
+        "cam0": Camera(GRID),
+        "cam1": Camera(GRID, world_from_cam=RigidTransform.from_translation([0.1, 0, 0])),
+    },
+    "rig": {
+        "cam0": Camera(GRID, LENSES["brown4"]),
+        "cam1": Camera(GRID, LENSES["fisheye"], ASIDE),
+        "cam2": Camera(replace(GRID, fx=400.5), LENSES["ds"], POSE),
+    },
+}
+WHY = r"holds (one camera|a pair|rectified)|has no .* lens|no place for|one camera model"
+
+
+def converted(source, out, name, *words):
+    """The status of `camviz convert`."""
+    return command.main(["convert", str(source), str(out), "--to", name, *words])
+
+
+def beside(cameras, a, b):
+    """What the sentence says of where camera b stands beside camera a."""
+    pose = cameras[a].cam_from_world * cameras[b].world_from_cam
+    length, angle = 1000 * np.linalg.norm(pose.translation), np.degrees(pose.rotation.magnitude())
+    return f"baseline {length:.4g} mm, rotation {angle:.2f}°"
+
+
+@pytest.mark.parametrize("rig", RIGS)
+@pytest.mark.parametrize("name", written())
+def test_a_baseline_comes_back_or_its_loss_is_named(tmp_path, capsys, name, rig):
+    """Through the command: all cameras at once, and each of them alone with its frame as the world."""
+    made = Calibration(RIGS[rig], Path("made"), "made", world_from_imu=IMU)
+    write(made, tmp_path / "chain.yaml", "kalibr")
+    status = converted(tmp_path / "chain.yaml", tmp_path / "whole", name)
+    assert rig != "pair" or (status == 0) == (written()[name].most_cameras != 1 and name != "kitti")
+    if status == 0:
+        back = camviz_clinic.load(tmp_path / "whole", size=(640, 480))
+        for a, b in zip(list(made.cameras), list(made.cameras)[1:], strict=False):
+            places = [list(made.cameras).index(each) for each in (a, b)]
+            read = [list(back.cameras.values())[place] for place in places]
+            np.testing.assert_allclose(
+                (read[0].cam_from_world * read[1].world_from_cam).as_matrix(),
+                made.rig.a_from_b(a, b).as_matrix(),
+                rtol=0,
+                atol=1e-9,
+            )
+    else:
+        assert re.search(WHY, capsys.readouterr().err)
+    for one in made.cameras:
+        capsys.readouterr()
+        status = converted(tmp_path / "chain.yaml", tmp_path / one, name, "--camera", one, "--first-as-world")
+        printed = capsys.readouterr()
+        text = next((line for line in printed.out.splitlines() if ": written from " in line), printed.err)
+        others = [other for other in made.cameras if other != one]
+        if status == 0 and one == "cam0" and written()[name].own_world:  # the others' files say where they stand
+            assert "(baseline " not in text
+        elif status == 0 or (name == "ros" and len(others) == 1):
+            assert [other for other in others if f"{other} ({beside(made.cameras, other, one)})" not in text] == []
+        else:
+            assert re.search(WHY, text)
+        assert (tmp_path / one).exists() == (status == 0)
+
+
+def test_a_camera_of_a_world_says_that_it_leaves_it(tmp_path):
+    made = calibration(Camera(GRID, LENSES["brown4"], POSE))
+    (lost,) = write(from_first_camera(made), tmp_path / "out.yml", "opencv", made)[:1]
+    assert lost == "the pose of cam0 in its world (distance 374.2 mm, rotation 74.48°)"  # √0.14 m, 1.3 rad
+    assert write(made, tmp_path / "model", "colmap") == ()
+
+
+# A pair for ROS.
+
+
+@pytest.mark.parametrize("lens", ["brown5", "fisheye"])
+@pytest.mark.parametrize("exchanged", [False, True])
+def test_a_pair_for_ros_is_stereo_rectified(tmp_path, lens, exchanged):
+    """By OpenCV's function, and by sensor_msgs/CameraInfo's definition: (u, v, w) = P (R x, 1) in both pictures."""
+    places = [RigidTransform.identity(), ASIDE]
+    cameras = [Camera(replace(GRID, fx=fx), LENSES[lens], at) for fx, at in zip((350.0, 352.0), places, strict=True)]
+    named = dict(zip(("left", "right"), cameras, strict=True))
+    made = Calibration({name: named[name] for name in sorted(named, reverse=exchanged)}, Path("made"), "made")
+    write(from_first_camera(made), tmp_path / "out", "ros")
+    trees = [yaml.safe_load((tmp_path / "out" / f"{name}.yaml").read_text()) for name in named]
+    R = [np.reshape(tree["rectification_matrix"]["data"], (3, 3)) for tree in trees]
+    P = [np.reshape(tree["projection_matrix"]["data"], (3, 4)) for tree in trees]
+    K = [np.reshape(tree["camera_matrix"]["data"], (3, 3)) for tree in trees]
+    D = [np.array(tree["distortion_coefficients"]["data"]) for tree in trees]
+    f, base = P[0][0, 0], np.linalg.norm(ASIDE.translation)
+    assert P[0][0, 3] == 0
+    assert P[1][0, 3] == pytest.approx(-f * base, rel=1e-12)
+
+    to_right = ASIDE.inv()
+    pose = to_right.rotation.as_matrix(), to_right.translation.reshape(3, 1)
+    if lens == "fisheye":
+        theirs = cv2.fisheye.stereoRectify(K[0], D[0], K[1], D[1], (640, 480), *pose, cv2.CALIB_ZERO_DISPARITY)
+    else:
+        theirs = cv2.stereoRectify(K[0], D[0], K[1], D[1], (640, 480), *pose, alpha=0)
+    for ours, other in zip((*R, *P), theirs[:4], strict=True):
+        np.testing.assert_allclose(ours, other, rtol=0, atol=1e-9)
+
+    rectified = [P[i] @ np.column_stack([POINTS @ R[0].T, np.ones(len(POINTS))]).T for i in (0, 1)]
+    rectified = [(each[:2] / each[2]).T for each in rectified]
+    undistorted = cv2.fisheye.undistortPoints if lens == "fisheye" else cv2.undistortPoints
+    fine = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 200, 1e-12)
+    for i, camera in enumerate(cameras):
+        words = {"criteria": fine} if lens == "fisheye" else {}
+        found = undistorted(camera.project(POINTS)[:, None], K[i], D[i], R=R[i], P=P[i][:, :3], **words)[:, 0]
+        np.testing.assert_allclose(rectified[i], found, rtol=0, atol=0.02)
+    np.testing.assert_allclose(rectified[0][:, 1], rectified[1][:, 1], rtol=0, atol=1e-9)
+    depth = f * base / (rectified[0] - rectified[1])[:, 0]
+    np.testing.assert_allclose(depth, (POINTS @ R[0].T)[:, 2], rtol=1e-9)
+
+    back = camviz_clinic.load(tmp_path / "out")
+    assert list(back.cameras) == ["left", "right"]
+    found, true = back.rig.a_from_b("right", "left").as_matrix(), to_right.as_matrix()
+    np.testing.assert_allclose(found, true, rtol=0, atol=1e-12)
+
+
+def test_one_camera_of_a_pair_is_refused_for_ros_with_a_command_that_works(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    cameras = {"left": Camera(GRID, LENSES["brown5"]), "right": Camera(GRID, LENSES["brown5"], ASIDE)}
+    write(Calibration(cameras, Path("made"), "made"), "my pair.yml", "opencv")
+    for words in (["--camera", "right", "--first-as-world"], ["--camera", "right"], ["--camera", "left"]):
+        assert converted("my pair.yml", "one.yaml", "ros", *words) == 2
+        err = capsys.readouterr().err
+        assert f"({beside(cameras, 'left', 'right')})" in err
+    assert converted("my pair.yml", "left.yaml", "ros") == 2
+    assert "expected the name of a new folder for left.yaml and right.yaml, such as ros" in capsys.readouterr().err
+    assert converted("my pair.yml", "-", "ros") == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["my pair.yml"]
+    assert command.main(shlex.split(err.split("`")[1])[1:]) == 0
+    assert "ros: written from OpenCV FileStorage, stereo, read back and found the same." in capsys.readouterr().out
+    assert_same(camviz_clinic.load("my pair.yml"), camviz_clinic.load("ros"))
+
+
+@pytest.mark.parametrize(
+    ("place", "other", "why"),
+    [
+        ([0, 0.1, 0], GRID, "stand one above the other"),
+        ([0, 0, 0], GRID, "stand in the same place"),
+        ([0, 0, 0.1], GRID, "stand in line"),
+        ([0.1, 0, 0], replace(GRID, width=320), "have different image sizes"),
+    ],
+)
+def test_a_pair_that_ros_cannot_rectify_is_refused(tmp_path, place, other, why):
+    made = calibration(Camera(GRID), Camera(other, world_from_cam=RigidTransform.from_translation(place)))
+    with pytest.raises(CalibrationError, match=why):
+        write(made, tmp_path / "out", "ros")
+
+
+def test_a_pair_under_45_degrees_is_still_side_by_side(tmp_path):
+    """As cv2.stereoRectify has it: the longer way decides."""
+    for y, is_written in ((0.0999, True), (0.1001, False)):
+        made = calibration(Camera(GRID), Camera(GRID, world_from_cam=RigidTransform.from_translation([0.1, y, 0])))
+        if is_written:
+            write(made, tmp_path / "out", "ros")
+            assert_same(made, camviz_clinic.load(tmp_path / "out"))
+        else:
+            with pytest.raises(CalibrationError, match="one above the other"):
+                write(made, tmp_path / "other", "ros")
+
+
+def test_the_rectification_of_a_ros_file_is_kept_or_named(tmp_path):
+    made = camviz_clinic.load(DATA / "ros_file.yaml")
+    assert write(made, tmp_path / "again.yaml", "ros") == ()
+    both = [yaml.safe_load(path.read_text()) for path in (DATA / "ros_file.yaml", tmp_path / "again.yaml")]
+    assert both[0] == both[1]
+    assert "the rectification R and P" in write(made, tmp_path / "camera.yml", "opencv")
+
+
+def test_two_ros_files_without_a_baseline_are_no_pair(tmp_path):
+    (tmp_path / "two").mkdir()
+    for name in ("left", "right"):
+        write(Calibration({name: Camera(GRID)}, Path("made"), "made"), tmp_path / "two" / f"{name}.yaml", "ros")
+    with pytest.raises(CalibrationError, match=r"expected P\[0, 3\] = 0 for the left camera and .*, got 0 and 0"):
+        camviz_clinic.load(tmp_path / "two")
 
 
 # Independent readers.
@@ -358,7 +564,7 @@ def test_convert_writes_what_load_reads(tmp_path, capsys):
     out = tmp_path / "model"
     assert command.main(["convert", str(DATA / "kalibr_chain.yaml"), str(out), "--to", "colmap"]) == 0
     assert_same(camviz_clinic.load(DATA / "kalibr_chain.yaml"), camviz_clinic.load(out))
-    assert "the place of the IMU: left out" in capsys.readouterr().out
+    assert capsys.readouterr().out.endswith("read back and found the same, but without the place of the IMU.\n")
 
 
 def test_convert_takes_one_camera_and_makes_it_the_world(tmp_path):

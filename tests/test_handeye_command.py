@@ -50,7 +50,7 @@ def words(shot, room):
 def test_x_is_printed_and_kept_with_a_sigma_that_reaches_the_truth(words, shot, room, capsys):
     assert main(words()) == 0
     said = capsys.readouterr().out
-    assert said.startswith("Good to ±0.22 mm and ±0.021° on each axis. No problem found; 10 checks ran, 1 could not")
+    assert said.startswith("Good to ±0.22 mm and ±0.021° on each axis. No problem found; 11 checks ran, 1 could not")
     assert "9 of 9 poses used" in said
     assert said.endswith("handeye.yaml: written.\n")
     kept = yaml.safe_load((room / "handeye.yaml").read_text(encoding="utf-8"))
@@ -126,6 +126,9 @@ def test_rows_belong_to_pictures_by_name_and_a_row_without_one_is_left_out(words
 def test_what_does_not_fit_together_is_refused_in_one_sentence(words, shot, room, capsys):
     plain = words(header="x,y,z,qx,qy,qz,qw", named=False, rows=range(8))
     assert "there are 8 poses and 9 pictures: name the pictures" in refused(capsys, room, *plain)
+    words(header="x,y,z,qx,qy,qz,qw", named=False, rows=[0, 1, 2, 3, 5, 6, 7, 8])
+    said = refused(capsys, room, *plain)
+    assert "if from 05.png on each picture belongs to the pose 1 row further up. Look for a missing row" in said
     (room / "poses.csv").write_text("picture,x,y,z,rx,ry,rz\nnone.png,0,0,1,0,0,0\n", encoding="utf-8")
     assert "no row names one of the pictures, such as 01.png" in refused(capsys, room, *plain)
     (room / "poses.csv").write_text("picture,x,y,z,rx,ry,rz\n01.png,0,0,1,0,0,0\n", encoding="utf-8")

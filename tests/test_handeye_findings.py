@@ -8,9 +8,30 @@ import pytest
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.motions import Turning
 from camviz_clinic.handeye import PoseError, RobotPoses
-from camviz_clinic.handeye.diagnosis import DISAGREE, KINDS, LITTLE_DEG, PosedPictures, turning_finding
-from camviz_clinic.handeye.mends import FEWEST_TRIED
-from camviz_clinic.handeye.virtual import FAULTS, about_one_axis, cell, healthy_case, moving, scaled, strayed
+from camviz_clinic.handeye.diagnosis import (
+    DISAGREE,
+    KINDS,
+    LITTLE_DEG,
+    MIN_BOARD_MOTION,
+    SAME_POSE_DEG,
+    SAME_POSE_MM,
+    STILL_BOARD_DEG,
+    UNKNOWN_DEG,
+    PosedPictures,
+    _first_alike,
+    turning_finding,
+)
+from camviz_clinic.handeye.mends import FEWEST_TRIED, MIN_SHIFT_GAIN, row_shifts
+from camviz_clinic.handeye.virtual import (
+    FAULTS,
+    about_one_axis,
+    cell,
+    healthy_case,
+    lost_pictures,
+    moving,
+    scaled,
+    strayed,
+)
 
 
 def case(true, poses=None, **more):
@@ -191,3 +212,133 @@ def test_as_many_poses_as_pictures_are_needed():
     true = cell(np.random.default_rng(16), 8)
     with pytest.raises(PoseError, match="as many poses as pictures, got 7 and 8"):
         case(true, RobotPoses(true.base_from_hand[:7]))
+
+
+MIS_SHIFTED = (  # x, y, z in metres and a rotation vector: a robot's table whose pictures 11 and 12 failed
+    (0.922646, 0.153601, 0.503828, 2.107910, 2.141915, -0.525420),
+    (0.698739, 0.046844, 0.508926, 2.042134, 2.284772, 0.047071),
+    (0.569810, 0.091924, 0.491688, 1.573297, 2.195162, 0.219519),
+    (0.892337, -0.159522, 0.554729, -2.251576, -1.755469, -0.043655),
+    (0.632211, 0.137728, 0.538629, 1.555787, 2.248244, -0.013195),
+    (0.978110, -0.133022, 0.566396, -1.667316, -2.217825, -0.077168),
+    (0.847468, 0.105437, 0.661169, -1.650840, -2.637651, 0.141452),
+    (0.577353, -0.034918, 0.536041, 1.615549, 2.370075, 0.389941),
+    (0.636026, -0.147912, 0.662020, -2.515115, -1.711500, -0.333867),
+    (0.763189, 0.098885, 0.491728, 2.041506, 2.200023, -0.086078),
+    (0.686737, -0.218073, 0.599507, -2.313599, -1.710437, -0.410722),
+    (0.867601, -0.021374, 0.471250, -1.729376, -2.299110, 0.107735),
+    (0.582866, 0.126184, 0.463402, 1.955084, 1.906215, 0.167844),
+    (0.695184, -0.174634, 0.462214, -1.564253, -2.573603, -0.810527),
+    (0.842880, 0.241823, 0.580725, 1.749055, 2.425662, -0.460088),
+)
+
+
+@pytest.mark.parametrize("rows", [[0] * 17, [*range(9), *[9] * 8], [i // 3 * 3 for i in range(17)]])
+def test_stale_poses_are_named_before_anything_is_solved(monkeypatch, rows):
+    """One pose in every row, from some row on, or in blocks of three."""
+    true = cell(np.random.default_rng(1), 17)
+    monkeypatch.setattr("camviz_clinic.handeye.mends.likely", lambda *given: pytest.fail("solved"))
+    found = case(true, RobotPoses(true.base_from_hand[rows]))
+    finding = of(found, "poses-repeated")
+    assert finding.severity == "fault"
+    assert not found.usable
+    assert ("All 17 robot poses are the same" in finding.sentence) == (set(rows) == {0})
+    assert ("pose 10 to pose 17" in finding.sentence) == (rows[-1] == 9)
+    assert dict(found.skipped)["poses-misread"] == "the poses must be recorded anew"
+
+
+def test_one_stale_row_is_a_warning_and_a_pause_is_none():
+    true = cell(np.random.default_rng(1), 17)
+    stale = case(true, RobotPoses(true.base_from_hand[[0, 1, 2, 3, 4, 5, 6, 6, *range(8, 17)]]))
+    assert [(each.id, each.severity) for each in stale.findings] == [
+        ("poses-repeated", "warning"),
+        ("stray-pose", "warning"),
+    ]
+    assert "pose 7 and pose 8" in stale.findings[0].sentence
+    twice = [*range(17), 5]
+    same = replace(true, base_from_hand=true.base_from_hand[twice], pixels=true.pixels[twice])
+    assert case(same).findings == ()
+
+
+@pytest.mark.parametrize(("factor", "same"), [(0.99, True), (1.01, False)])
+def test_poses_within_a_robots_scatter_are_the_same(factor, same):
+    apart = RigidTransform.from_components(
+        [[0, 0, 0], [factor * SAME_POSE_MM / 1000, 0, 0]], Rotation.from_rotvec([[0, 0, 0], [0, 0, 0]])
+    )
+    turned = RigidTransform.from_rotation(
+        Rotation.from_rotvec([[0, 0, 0], [factor * SAME_POSE_DEG, 0, 0]], degrees=True)
+    )
+    assert [_first_alike(poses)[1] == 0 for poses in (apart, turned)] == [same, same]
+
+
+def test_a_rotation_that_is_never_read_is_named():
+    true = cell(np.random.default_rng(1), 12)
+    poses = RigidTransform.from_components(true.base_from_hand.translation, true.base_from_hand.rotation[[0] * 12])
+    assert "rotation is the same in all 12 rows" in of(case(true, RobotPoses(poses)), "poses-repeated").sentence
+
+
+@pytest.mark.parametrize("to_hand", [False, True])
+@pytest.mark.parametrize(
+    ("lost", "rows", "says"),
+    [
+        ((10, 2), False, "from pose 11 on each picture belongs to the pose 2 rows further down"),
+        ((7, 1), False, "from pose 8 on each picture belongs to the pose 1 row further down"),
+        ((6, 1), True, "from pose 7 on each picture belongs to the pose 1 row further up"),
+    ],
+)
+def test_a_shift_is_named_with_the_row_it_begins_at(to_hand, lost, rows, says):
+    true = lost_pictures(cell(np.random.default_rng(1), 17, to_hand), *lost, rows=rows)
+    finding = of(case(true), "poses-shifted")
+    assert says in finding.sentence
+    assert f"Look for a missing {'row' if rows else 'picture'} or surplus" in finding.remedy
+
+
+def test_a_shift_after_failed_pictures_is_found_by_angles():
+    """Row 11 is of picture 11, which failed, as 12 did: pictures 13 to 15 belong to the poses two rows down."""
+    numbers = np.array(MIS_SHIFTED)
+    A = RigidTransform.from_components(numbers[:, :3], Rotation.from_rotvec(numbers[:, 3:]))
+    rng = np.random.default_rng(3)
+    X, Z = (RigidTransform.from_components(rng.normal(0, 1, 3), Rotation.random(random_state=s)) for s in (1, 2))
+    noise = Rotation.from_rotvec(rng.normal(0, 0.2, (15, 3)), degrees=True)
+    later = RigidTransform.from_components(rng.normal(0, 1, (2, 3)), Rotation.random(2, random_state=4))
+    boards = X.inv() * RigidTransform.concatenate([A, later]).inv() * Z
+    boards = boards[[*range(10), *range(12, 17)]] * RigidTransform.from_rotation(noise)
+    assert row_shifts(A, np.arange(15), boards).tolist() == [0] * 10 + [2] * 5
+    healthy = (X.inv() * A.inv() * Z) * RigidTransform.from_rotation(noise)
+    assert row_shifts(A, np.arange(15), healthy) is None
+
+
+@pytest.mark.parametrize(("moved", "found"), [(1, False), (MIN_SHIFT_GAIN, True)])
+def test_two_pictures_more_must_agree_for_a_shift(moved, found):
+    true = cell(np.random.default_rng(5), 14, robot_deg=0.001)
+    boards = true.X.inv() * true.base_from_hand.inv() * true.Z
+    kept = np.delete(np.arange(14), [14 - moved - 1])  # one picture is lost before the last `moved` ones
+    assert (row_shifts(true.base_from_hand, np.arange(13), boards[kept]) is not None) == found
+
+
+def test_large_errors_are_not_called_little_turning():
+    true = cell(np.random.default_rng(8), 8)
+    result = case(true).result
+    noisy = replace(result, adjusted=replace(result.adjusted, noise=replace(result.noise, turn=np.radians(20))))
+    finding = turning_finding(Turning(np.array([25.0, 20, 15]), np.eye(3)), noisy)
+    assert (finding.id, finding.severity) == ("robot-disagrees", "fault")
+
+
+@pytest.mark.parametrize(("factor", "ids"), [(0.99, []), (1.01, ["poses-repeated"])])
+def test_a_board_has_moved_from_a_twentieth_of_its_distance(factor, ids):
+    true = cell(np.random.default_rng(1), 6)
+    found = case(true, RobotPoses(true.base_from_hand[[0, 0, 2, 3, 4, 5]]))
+    turns = Rotation.from_rotvec(np.zeros((6, 3)))
+    boards = RigidTransform.from_components([[0, 0, 1], [factor * MIN_BOARD_MOTION, 0, 1], *[[0, 0, 1]] * 4], turns)
+    found.__dict__["cam_from_board"] = boards
+    assert [each.id for each in found._repeated()] == ids
+
+
+@pytest.mark.parametrize(
+    ("robot", "boards", "still"),
+    [(0.99, 0.99, True), (1.01, 0.99, False), (0.99, 1.01, False)],
+)
+def test_hand_and_boards_are_still_below_their_limits(robot, boards, still):
+    found = case(cell(np.random.default_rng(1), 6))
+    found.__dict__["_turned_deg"] = (robot * UNKNOWN_DEG, boards * STILL_BOARD_DEG)
+    assert found._still == still

@@ -24,7 +24,17 @@ from camviz.lenses import (
 )
 from camviz_clinic.calibration.difference import NothingSharedError, difference
 from camviz_clinic.checks import inspect, inspect_file
-from camviz_clinic.checks.findings.impossible import FARTHEST, FOCAL, STRETCHED, stretched
+from camviz_clinic.checks.findings.impossible import (
+    FARTHEST,
+    FOCAL,
+    MAX_FOCAL_RATIO,
+    MAX_LOST,
+    MAX_OFF_CENTRE,
+    MAX_PIXEL_ASPECT,
+    MAX_TANGENTIAL,
+    STRETCHED,
+    stretched,
+)
 from camviz_clinic.files import Calibration, CalibrationError, formats, write
 
 ABSURD = (b"1e6", b"-1e6", b"1e5", b"1e-9", b"0")
@@ -125,7 +135,8 @@ def test_a_focal_length_outside_the_range_of_lenses_is_named_and_its_ends_are_no
     """A hundredth of 640 pixels is 6.4, and a thousand times is 640,000."""
     for share in (low, high):
         camera = replace(PLAIN, intrinsics=replace(PLAIN.intrinsics, **{key: 640 * share}))
-        named = [each.sentence for each in findings(rig({"camera": camera})) if f"{key} = " in each.sentence]
+        said = [each.sentence for each in findings(rig({"camera": camera})) if "longer side" in each.sentence]
+        named = [each for each in said if f"{key} = " in each]
         assert len(named) == (share not in FOCAL)
 
 
@@ -170,3 +181,65 @@ def test_a_border_that_is_stretched_beyond_any_lens_is_named_and_one_at_the_limi
 @pytest.mark.parametrize("focal", [150.0, 500.0, 4000.0])
 def test_lenses_that_there_are_stretch_the_border_less(lens, focal):
     assert stretched(Camera(replace(CAMERA.intrinsics, fx=focal, fy=focal), lens)) < 1.6
+
+
+def with_grid(**values):
+    return replace(PLAIN, intrinsics=replace(PLAIN.intrinsics, **values))
+
+
+def folding_at(lost):
+    """k1 < 0 alone: r + k1 r³ turns back at r² = 1/(-3 k1), where it is 2/3 r; so large is the picture's circle."""
+    radius = np.sqrt((1 - lost) * 640 * 480 / np.pi) / 500
+    return replace(CAMERA, lens=BrownConrady(k1=-4 / 27 / radius**2))
+
+
+@pytest.mark.parametrize(
+    ("make", "limit", "slack"),
+    [
+        (lambda p: with_lens(p1=-p), MAX_TANGENTIAL, 1e-9),
+        (lambda p: with_lens(p2=p), MAX_TANGENTIAL, 1e-9),
+        (lambda s: with_lens(s1=s), 3 * MAX_TANGENTIAL, 1e-9),
+        (lambda off: with_grid(cx=319.5 - 640 * off), MAX_OFF_CENTRE, 1e-9),
+        (lambda off: with_grid(cx=319.5, cy=239.5 + 640 * off), MAX_OFF_CENTRE, 1e-9),
+        (lambda ratio: with_grid(fy=500 / ratio), MAX_PIXEL_ASPECT, 1e-9),
+        (folding_at, MAX_LOST, 0.01),
+    ],
+    ids=["p1", "p2", "s1", "cx", "cy", "aspect", "lost"],
+)
+def test_an_impossible_magnitude_is_named_from_its_bound_on(make, limit, slack):
+    below, above = (findings(rig({"camera": make(limit * by)})) for by in (1 - slack, 1 + slack))
+    assert (len(below), len(above)) == (0, 1)
+
+
+def test_the_bound_of_tangential_coefficients_is_a_tilt_of_17_degrees():
+    """A sensor tilted by τ about y has x/(1 - x tan τ), by OpenCV's own tilted model; p2 gives x + 3 p2 x² on y = 0."""
+    x, tau = 1e-3, np.arctan(3 * MAX_TANGENTIAL)
+    tilted = BrownConrady(tau_y=tau).distort([[x, 0], [-x, 0]])[:, 0]
+    bent = BrownConrady(p2=MAX_TANGENTIAL).distort([[x, 0], [-x, 0]])[:, 0]
+    assert np.degrees(tau) == pytest.approx(16.7, abs=0.05)
+    assert abs(tilted.sum()) == pytest.approx(bent.sum(), rel=0.1)
+
+
+@pytest.mark.parametrize("ratio", [3 / 4 * 9 / 16 * 4 / 3, 1 / 2, 9 / 16 * 4 / 3, 2])
+def test_an_aspect_that_resizing_or_binning_explains_is_possible(ratio):
+    assert findings(rig({"camera": with_grid(fy=500 / ratio)})) == []
+
+
+def test_like_cameras_of_a_pair_with_very_different_focal_lengths_are_named():
+    """Not cameras with pictures of two sizes, nor three cameras."""
+    for ratio, count in ((MAX_FOCAL_RATIO * (1 - 1e-9), 0), (MAX_FOCAL_RATIO * (1 + 1e-9), 1)):
+        f = {"fx": 500 * ratio, "fy": 500 * ratio}
+        right = replace(with_grid(**f), world_from_cam=APART)
+        assert len(findings(rig({"cam0": PLAIN, "cam1": right}))) == count
+        larger = replace(right, intrinsics=replace(right.intrinsics, width=1280, height=960, cx=640, cy=480))
+        assert findings(rig({"cam0": PLAIN, "cam1": larger})) == []
+        assert findings(rig({"cam0": PLAIN, "cam1": right, "cam2": PLAIN.at(IMU)})) == []
+
+
+def test_the_published_runaway_pair_and_uneven_camera_are_impossible():
+    """Two public reports: fx = 474 and 3808 px of two like cameras, and pixels 1.58 times as high as wide."""
+    first = Camera(Intrinsics(648, 486, 474.318, 477.518, 346.873, 244.364))
+    second = Camera(Intrinsics(648, 486, 3808.49, 3826.463, 304.443, 233.327)).at(APART)
+    assert ["474.3 and 3808" in each.sentence for each in findings(rig({"cam0": first, "cam1": second}))] == [True]
+    uneven = Camera(Intrinsics(1280, 960, 3039.117, 4814.029, 644.948, 431.326))
+    assert ["1.58 times" in each.sentence for each in findings(rig({"camera": uneven}))] == [True]

@@ -247,8 +247,9 @@ def test_what_cannot_be_read_is_refused_in_one_sentence(loaded, sentence):
 def test_what_is_written_is_read_back_and_what_is_not_is_named(tmp_path, loaded, lens, count):
     camera = Camera(Intrinsics(320, 240, 353.75, 352.5, 163.5, 119.75), lens)
     path = tmp_path / "written.json"
-    left_out = write(Calibration({"camera": camera}, path, "made", board=loaded().board), path, "photonvision")
-    assert left_out == ("The format does not hold the board: left out.",)
+    lost = write(Calibration({"camera": camera}, path, "made", board=loaded().board), path, "photonvision")
+    pinhole = ["the mark of a pinhole (its distortion coefficients are zeros)"] * (lens == Perspective())
+    assert lost == (*pinhole, "the board")
     tree = json.loads(path.read_text())
     assert (tree["distCoeffs"]["cols"], len(tree["distCoeffs"]["data"]), tree["distCoeffs"]["type"]) == (
         count,

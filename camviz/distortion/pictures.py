@@ -135,12 +135,18 @@ def remap(image: np.ndarray, maps: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
     return cv2.remap(image, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
 
 
-def undistorted_intrinsics(camera: Camera, alpha: Share) -> tuple[Intrinsics, tuple[int, int, int, int]]:
+def undistorted_intrinsics(
+    camera: Camera, alpha: Share, *, square: bool = False
+) -> tuple[Intrinsics, tuple[int, int, int, int]]:
     """Intrinsics, of the camera's size, for its undistorted picture.
 
     alpha = 0 shows the largest upright rectangle without black borders, alpha = 1 every pixel of the photograph, and
     between them the focal lengths and principal points are mixed, as in cv2.getOptimalNewCameraMatrix. Rays beyond a
     fold or 80° from the axis are left out.
+
+    Args:
+        square: Make fx = fy, as no distortion asks for another shape of the pixels. OpenCV's two focal lengths fit the
+            rectangle to the picture along each axis; the larger one shows no black, the smaller one every pixel.
 
     Returns:
         intrinsics: Of the undistorted picture.
@@ -162,7 +168,13 @@ def undistorted_intrinsics(camera: Camera, alpha: Share) -> tuple[Intrinsics, tu
     outer = np.array([left[:, 0].min(), top[:, 1].min(), right[:, 0].max(), bottom[:, 1].max()])
     if not (inner[:2] < inner[2:]).all():
         raise ValueError("alpha = 0 needs an upright rectangle around the axis that the camera sees; it sees none")
-    fx, fy, cx, cy = ((1 - alpha) * _filling(inner, intrinsics) + alpha * _filling(outer, intrinsics)).tolist()
+    filling = [_filling(inner, intrinsics), _filling(outer, intrinsics)]
+    if square:
+        filling = [
+            _centred_on(inner, max(filling[0][:2]), intrinsics),
+            _centred_on(outer, min(filling[1][:2]), intrinsics),
+        ]
+    fx, fy, cx, cy = ((1 - alpha) * filling[0] + alpha * filling[1]).tolist()
     result = Intrinsics(intrinsics.width, intrinsics.height, fx, fy, cx, cy)
     first, last = np.ceil(result.to_pixels(inner[:2]) - 1e-6), np.floor(result.to_pixels(inner[2:]) + 1e-6)
     x0, y0 = (int(value) for value in np.maximum(first, 0))
@@ -174,6 +186,13 @@ def _filling(rectangle: Array, intrinsics: Intrinsics) -> Array:
     """fx, fy, cx, cy that spread a rectangle (left, top, right, bottom) of the plane z = 1 over the whole picture."""
     focal = (np.array([intrinsics.width, intrinsics.height]) - 1) / (rectangle[2:] - rectangle[:2])
     return np.concatenate([focal, -focal * rectangle[:2]])
+
+
+def _centred_on(rectangle: Array, focal_length: float, intrinsics: Intrinsics) -> Array:
+    """fx, fy, cx, cy of one focal length with a rectangle's centre on the plane z = 1 in the picture's middle."""
+    middle = (np.array([intrinsics.width, intrinsics.height]) - 1) / 2
+    centre = (rectangle[:2] + rectangle[2:]) / 2
+    return np.concatenate([[focal_length, focal_length], middle - focal_length * centre])
 
 
 def _outline(camera: Camera, samples: int) -> Array:

@@ -13,13 +13,14 @@ from numpy.polynomial import Polynomial
 from camviz.lenses.arrays import Coordinates, ImagePoints, ImagePointsLike, Jacobians, Mask, Radii, RadiiLike
 from camviz.lenses.base import Array, as_points, blockwise, check_parameters, check_range
 from camviz.lenses.declarations import CalibrationModel, Example, Fold, Spelling
-from camviz.lenses.folding import FoldingLens, first_positive_root
+from camviz.lenses.folding import FoldingLens, first_positive_root, polynomial_roots
 from camviz.lenses.perspective import Perspective
 
 GRID = "fx fy cx cy"
 RADTAN = "k1 k2 p1 p2"
 RATIONAL = f"{RADTAN} k3 k4 k5 k6"
 PRISM = f"{RATIONAL} s1 s2 s3 s4"
+MAX_CANCELLED_GAP = 0.01  # of r² at a pole: a root of the numerator as near as this almost cancels the pole
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,8 @@ class BrownConrady(FoldingLens):
 
     and from there onto a sensor tilted by τx and τy. A polynomial folds: only rays in front of the camera have an
     image, and only if the way to them from the axis meets neither the fold of the radial part, nor its pole, nor a
-    Jacobian determinant of 0 (`valid`).
+    Jacobian determinant of 0 (`valid`). Shortly before a pole that the numerator almost cancels the domain ends as well
+    (`cancelled_radius`): other programs step over such a pole, so that its rays are not theirs.
 
     Args:
         k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4: Coefficients of lengths in focal lengths, in OpenCV's order.
@@ -224,17 +226,41 @@ class BrownConrady(FoldingLens):
 
         It never turns back, or has a pole before it does, at which it is infinite and all images end.
         """
-        N, D = (np.asarray(each.coef, dtype=float) for each in (self.numerator, self.denominator))
-        sloping_N, sloping_D = (np.arange(len(each)) * each for each in (N, D))  # s N' and s D'
-        # g' = (N D + 2 (s N' D - N s D')) / D²
-        rising = np.convolve(N, D) + 2 * (np.convolve(sloping_N, D) - np.convolve(N, sloping_D))
-        fold = sqrt(first_positive_root(rising))
+        fold = sqrt(first_positive_root(self._slope_polynomial.coef))
         return fold if fold < self.pole_radius else inf
+
+    @cached_property
+    def _slope_polynomial(self) -> Polynomial:
+        """N D + 2 s (N' D - N D') = g' D², of s = r²: it has the sign of g'."""
+        N, D, s = self.numerator, self.denominator, Polynomial([0, 1])
+        return N * D + 2 * s * (N.deriv() * D - N * D.deriv())
 
     @cached_property
     def pole_radius(self) -> float:
         """The smallest positive root of D(r²), where the radial part is infinite; infinity if there is none."""
         return sqrt(first_positive_root(self.denominator.coef))
+
+    @cached_property
+    def cancelled_radius(self) -> float:
+        """Where a pole that the numerator almost cancels doubles the slope of g; infinity if there is none.
+
+        With a root of N by a `gap` beyond that of D, both relative, g is its smooth continuation times 1 + gap/t at
+        t = 1 - r²/pole². From t = √(2 gap) on, a hairline of rays has all the rest of the image (a Froissart doublet).
+        """
+        pole, zero = self.pole_radius**2, first_positive_root(self.numerator.coef)
+        gap = zero / pole - 1 if pole < inf else inf
+        return sqrt(pole * (1 - sqrt(2 * gap))) if 0 <= gap <= MAX_CANCELLED_GAP else inf
+
+    @cached_property
+    def limit_radius(self) -> float:
+        """Where the radial part ends on the way from the axis: the least of its fold, pole and cancelled radius."""
+        return min(self.fold_radius, self.pole_radius, self.cancelled_radius)
+
+    @cached_property
+    def critical_radii(self) -> Array:
+        """The real parts of all roots of g' and D, near which g may change quickly: (n,), focal lengths."""
+        roots = np.concatenate([polynomial_roots(each.coef) for each in (self._slope_polynomial, self.denominator)])
+        return np.sqrt(roots.real[roots.real > 0])
 
     def valid(self, xy: ImagePointsLike) -> Mask:
         """Whether ideal points have an image that they share with no other point of the domain."""

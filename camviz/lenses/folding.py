@@ -36,6 +36,16 @@ class FoldingLens(Lens):
     def pole_radius(self) -> float:
         """Where the radial part is infinite, likewise."""
 
+    @property
+    @abstractmethod
+    def limit_radius(self) -> float:
+        """Where the radial part ends on the way from the axis: the fold, the pole, or shortly before the pole."""
+
+    @property
+    @abstractmethod
+    def critical_radii(self) -> Array:
+        """Radii (n,) where the radial part may change so quickly that equal steps would miss it."""
+
     @abstractmethod
     def radial(self, r: RadiiLike) -> Radii:
         """The distorted radius of an ideal one."""
@@ -97,7 +107,7 @@ class FoldingLens(Lens):
     @cached_property
     def _limits(self) -> tuple[float, float]:
         """Radii: ideal points up to the first are valid, beyond the second they are not."""
-        outer = min(self.fold_radius, self.pole_radius)
+        outer = self.limit_radius
         if self._symmetric and self._tilt is None:
             return outer, outer
         return float(self._reach[0].min()), outer
@@ -105,8 +115,9 @@ class FoldingLens(Lens):
     @cached_property
     def _spokes(self) -> tuple[Array, Array, Array]:
         """Radii (n, 1) along 64 lines from the axis, their azimuths, and the least determinant (n, 64) so far."""
-        end = min(atan(min(self.fold_radius, self.pole_radius)), STEEPEST)
-        r, azimuth = np.tan(end * _fractions(128)[:, None]), np.linspace(0, 2 * pi, 65)[1:]
+        r = np.tan(min(atan(self.limit_radius), STEEPEST) * _fractions(128))
+        r = np.union1d(r, self.critical_radii[self.critical_radii < r[-1]])[:, None]
+        azimuth = np.linspace(0, 2 * pi, 65)[1:]
         with np.errstate(all="ignore"):
             determinant = self._orientation(r * np.cos(azimuth), r * np.sin(azimuth))
         return r, azimuth, np.minimum.accumulate(np.nan_to_num(determinant, nan=-1))
@@ -114,9 +125,9 @@ class FoldingLens(Lens):
     @cached_property
     def _rim(self) -> tuple[Array, Array]:
         """Azimuths in the image before its tilt, and radii that no image exceeds there, or UNBOUNDED."""
-        outer = min(self.fold_radius, self.pole_radius)
+        outer = self.limit_radius
         if self._symmetric and self._tilt is None:
-            return np.zeros(1), np.array([self.radial(outer) if outer == self.fold_radius < inf else UNBOUNDED])
+            return np.zeros(1), np.array([self.radial(outer) if outer < self.pole_radius else UNBOUNDED])
         r, azimuth, least = self._spokes
         upright = least > 0
         if not upright[0].all():
@@ -162,6 +173,7 @@ class FoldingLens(Lens):
         edge = np.flatnonzero(~upright & (r <= far))
         start = near[edge] / r[edge]
         steps = start + np.linspace(0, 1, 17)[1:, None] * (1 - start)
+        steps = np.concatenate([steps, np.minimum(self.critical_radii[:, None] / r[edge], 1)])
         upright[edge] = np.all(self._orientation(steps * x[edge], steps * y[edge]) > 0, axis=0)
         return upright
 
@@ -185,7 +197,7 @@ class FoldingLens(Lens):
     @cached_property
     def _inverse_table(self) -> tuple[Array, Array]:
         """r² and the ratio of the ideal to the distorted radius, against the square of the distorted radius."""
-        end = min(atan(min(self.fold_radius, self.pole_radius * (1 - 1e-6))), STEEPEST)
+        end = min(atan(min(self.limit_radius, self.pole_radius * (1 - 1e-6))), STEEPEST)
         r = np.tan(end * np.sin(np.linspace(0, pi / 2, 1025)))
         s = r * r
         return np.maximum.accumulate(np.square(self.radial(r))), 1 / self._ratio(s)
@@ -276,14 +288,20 @@ def homography(H: np.ndarray, x: Array, y: Array) -> tuple[Array, Array, Array]:
 
 
 def first_positive_root(coefficients: np.ndarray) -> float:
-    """The smallest s > 0 with c0 + c1 s + c2 s² + … = 0; infinity where there is none. c0 must not be 0.
+    """The smallest s > 0 with c0 + c1 s + c2 s² + … = 0; infinity where there is none. c0 must not be 0."""
+    roots = polynomial_roots(coefficients)
+    real = roots.real[np.abs(roots.imag) <= 1e-7 * np.abs(roots)]
+    return float(real[real > 0].min(initial=inf))
+
+
+def polynomial_roots(coefficients: np.ndarray) -> np.ndarray:
+    """All complex s (n,) with c0 + c1 s + c2 s² + … = 0. c0 must not be 0.
 
     Solved for 1/s, whose leading coefficient is c0: a vanishing last coefficient then costs no accuracy.
     """
     inverses = np.roots(coefficients)
-    real = inverses.real[np.abs(inverses.imag) <= 1e-7 * np.abs(inverses)]
-    largest = real.max(initial=0.0)
-    return float(1 / largest) if largest > 0 else np.inf
+    with np.errstate(all="ignore"):
+        return np.asarray(1 / inverses[inverses != 0])
 
 
 def solve_rising(

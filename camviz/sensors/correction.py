@@ -232,7 +232,7 @@ def _ratio(above: Any, below: Array) -> Array:
 
 
 def stabilised(electrons: ArrayLike, dark_noise_e: float) -> Array:
-    """2 sqrt(e + 3/8 + σ_d²): noise of one everywhere, in the light and in the dark (Anscombe 1948; Starck 1998)."""
+    """2 sqrt(e + 3/8 + σ_d²): noise of 1 in the light and in the dark (Murtagh, Starck and Bijaoui 1995)."""
     return 2 * np.sqrt(np.maximum(np.asarray(electrons, dtype=float) + 3 / 8 + dark_noise_e**2, 0))
 
 

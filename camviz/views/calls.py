@@ -34,14 +34,16 @@ SHARED: tuple[ModuleType, ...] = (builtins, math, np, np.linalg, np.random)
 def contained(output: io.StringIO) -> Iterator[None]:
     """What is called here prints into `output`, and what it replaces in the modules everybody uses is put back.
 
-    A debugger that is opened here prints on the screen.
+    So is the limit of calls within calls. A debugger that is opened here prints on the screen.
     """
+    limit = sys.getrecursionlimit()
     before = [(module.__dict__, module.__dict__.copy()) for module in SHARED]
     printed = _Captured(output, sys.stdout)
     try:
         with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(sys.stderr), quiet():
             yield
     finally:
+        sys.setrecursionlimit(limit)
         for names, kept in before:  # without a builtin function, for those may be among what was replaced
             names.update(kept)
 
@@ -70,11 +72,20 @@ def quiet() -> Iterator[None]:
 def explain(error: BaseException, function: Function) -> str:
     """An exception in words: what happened, and in which line of the function."""
     what = f"Your function stopped with {type(error).__name__}: {message(error)}."
-    home = getattr(attribute(function, "__code__"), "co_filename", None)
-    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == home]
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == _home(function)]
     if not frames or not frames[-1].line:
         return what
     return f"{what} It happened in line {frames[-1].lineno}: ``{frames[-1].line}``."
+
+
+def is_stub_error(error: BaseException, function: Function) -> bool:
+    """Whether the function's own file raised NotImplementedError, and not a library that it calls."""
+    frames = traceback.extract_tb(error.__traceback__)
+    return isinstance(error, NotImplementedError) and frames[-1].filename == _home(function)
+
+
+def _home(function: Function) -> str | None:
+    return getattr(attribute(function, "__code__"), "co_filename", None)
 
 
 def attribute(function: Function, name: str) -> Any:

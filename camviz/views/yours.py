@@ -17,7 +17,7 @@ import numpy as np
 from camviz.draw import prose, svg
 from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel
-from camviz.views.calls import as_arrays, attribute, contained, explain, stopped
+from camviz.views.calls import as_arrays, attribute, contained, explain, is_stub_error, stopped
 from camviz.views.patience import Patience, TimeIsUp
 
 Function = Callable[..., Any]
@@ -172,9 +172,9 @@ def _answers(
         again = "It is not called again until you have run the cell in which it stands."
         _stopped[id(function)] = function, f"{stopped(name, stop)[:-1]}, {left_out} {again}"
         return empty, _stopped[id(function)][1]
-    except NotImplementedError:
-        return empty, f"{name} {_NOT_YET[0]}, {left_out}"
     except BaseException as error:
+        if is_stub_error(error, function):
+            return empty, f"{name} {_NOT_YET[0]}, {left_out}"
         return empty, f"{name} gives no answer, {left_out} {prose.to_plain(explain(error, function))}"
     if parts is None:
         return empty, f"{name} {_NOT_YET[1]}, {left_out}"

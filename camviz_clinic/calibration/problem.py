@@ -100,7 +100,7 @@ class Problem:
 
     @cached_property
     def residuals(self) -> dict[str, Array]:
-        """Observed less projected, in pixels (views, corners, 2) by camera; NaN where a corner was not seen."""
+        """Detected less projected, in pixels (views, corners, 2) by camera; NaN where a corner was not seen."""
         return {name: self.detections[name] - self.projected(name) for name in self.cameras}
 
     def projected(self, name: str) -> Array:

@@ -98,7 +98,7 @@ class RollingAdjustment:
 
     @cached_property
     def residuals(self) -> Array:
-        """Observed less projected, in pixels (pieces, frames, corners, 2); NaN where a corner was not seen."""
+        """Detected less projected, in pixels (pieces, frames, corners, 2); NaN where a corner was not seen."""
         return self.detections - self.camera.project(self._placed[2])
 
     @cached_property

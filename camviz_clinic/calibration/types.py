@@ -18,6 +18,7 @@ from camviz_clinic.calibration.boards import kind_of
 from camviz_clinic.calibration.boards.aprilgrid import FAMILY
 from camviz_clinic.calibration.denominator_prior import DenominatorPrior
 from camviz_clinic.calibration.line_delay import LineDelay
+from camviz_clinic.calibration.rectification import Rectification
 from camviz_clinic.calibration.redundancy import Redundancy
 from camviz_clinic.calibration.stamp import Stamp
 from camviz_clinic.calibration.undecided import Undecided
@@ -32,6 +33,7 @@ class CalibrationError(ValueError):
         sentence: The message: where, what was expected, what came.
         id: The clinic's finding that this is, such as "bad-k"; empty where the file is simply unreadable.
         value: The number that shows it.
+        remedy: What to change in the file, where that is known.
 
     >>> from camviz_clinic.files import load
     >>> load("none.yaml")
@@ -39,9 +41,9 @@ class CalibrationError(ValueError):
     camviz_clinic.calibration.types.CalibrationError: none.yaml: there is no such file
     """
 
-    def __init__(self, sentence: str, id: str = "", value: float | None = None) -> None:
+    def __init__(self, sentence: str, id: str = "", value: float | None = None, remedy: str = "") -> None:
         super().__init__(sentence)
-        self.id, self.value = id, value
+        self.id, self.value, self.remedy = id, value, remedy
 
 
 @dataclass(frozen=True)
@@ -216,6 +218,7 @@ class Calibration:
         stamps: What the calibration of each camera holds for.
         line_delays: How long each camera's rolling shutter takes from row to row, where that is known. The corners are
             then where a shutter of all rows at once would have seen them.
+        rectifications: How each camera's pictures are rectified, where the file has R and P beside K, as ROS's do.
         undecided: Combinations of each camera's intrinsics that the corners do not decide, where these were more than
             `detections` holds, as those of several boards; the worst first. No file holds it.
 
@@ -249,6 +252,7 @@ class Calibration:
     redundant: tuple[Redundancy, ...] = ()
     stamps: Mapping[str, Stamp] = field(default_factory=dict)
     line_delays: Mapping[str, LineDelay] = field(default_factory=dict)
+    rectifications: Mapping[str, Rectification] = field(default_factory=dict, repr=False)
     undecided: Mapping[str, tuple[Undecided, ...]] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:

@@ -20,6 +20,7 @@ from camviz_clinic.checks.doctor import Shown
 from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.findings import kinds
 from camviz_clinic.checks.findings.described import described_wrong
+from camviz_clinic.checks.pair_difference import PairDifference, pair_differences
 from camviz_clinic.checks.registry import Finding
 from camviz_clinic.checks.summary import Summary, bend_mm
 from camviz_clinic.files import CalibrationError, load
@@ -40,6 +41,7 @@ class Inspection:
         compare: What it was compared with.
         source: The file, where it could not be read.
         differences: By camera, from the calibration that it is compared with.
+        pair_differences: By stereo pair, likewise.
         at: A distance in metres at which errors are told.
         ignored: What was found and is left out of `findings`.
         made: What the checks made, before causes are told.
@@ -60,6 +62,7 @@ class Inspection:
     compare: Calibration | None = field(default=None, repr=False)
     source: Path | None = None
     differences: tuple[CameraDifference, ...] = ()
+    pair_differences: tuple[PairDifference, ...] = ()
     at: float | None = None
     ignored: tuple[Finding, ...] = ()
     made: tuple[Finding, ...] = field(default=(), repr=False)
@@ -91,6 +94,7 @@ class Inspection:
             tuple(skipped),
             evidence.compare,
             differences=tuple(differences(evidence)),
+            pair_differences=tuple(pair_differences(evidence)),
             at=evidence.at,
             made=tuple(findings),
             evidence=evidence,
@@ -128,7 +132,7 @@ class Inspection:
         cameras = self.calibration.cameras if self.calibration else {}
         return {
             "verdict": self.verdict,
-            **({"differences": [asdict(each) for each in self.differences]} if self.compare else {}),
+            **self._compared(),
             "cameras": [self._camera(name, camera) for name, camera in cameras.items()],
             **self._board_warp(),
             "accuracy": list(self.summary.accuracy.values) if self.summary else [],
@@ -139,6 +143,19 @@ class Inspection:
             **self._notes(),
             "ignored": [{"id": id, "count": count} for id, count in words.count_of_each(self.ignored).items()],
         }
+
+    def _compared(self) -> dict[str, Any]:
+        """What differs from another calibration; nothing where there is none."""
+        if self.compare is None:
+            return {}
+        by_pair = [asdict(each) for each in self.pair_differences]
+        return {"differences": [asdict(each) for each in self.differences], "pair_differences": by_pair}
+
+    @property
+    def compared(self) -> tuple[str, ...]:
+        """How far it is from the calibration that it is compared with, in sentences."""
+        by_pair = (each.sentence for each in self.pair_differences)
+        return (*(each.sentence for each in self.differences), *by_pair)
 
     def _board_warp(self) -> dict[str, Any]:
         """The board's two sagittas and their σ in mm, where they were solved for."""
@@ -200,7 +217,7 @@ class Inspection:
         said = words.text(
             self.findings, self.checked, self.skipped, self.next_step, glance, self.ignored, self._accuracy
         )
-        return "".join(f"{each.sentence}\n" for each in self.differences) + "\n" * bool(self.differences) + said
+        return "".join(f"{each}\n" for each in self.compared) + "\n" * bool(self.compared) + said
 
     def __str__(self) -> str:
         return self.as_text()
@@ -295,7 +312,8 @@ def inspect_file(
     except CalibrationError as error:
         if not error.id:
             raise
-        finding = kinds()[error.id].found(f"{str(error).removeprefix(f'{Path(path)}: ')}.", error.value)
+        text = str(error).removeprefix(f"{Path(path)}: ")
+        finding = kinds()[error.id].of_file(CalibrationError(text, error.id, error.value, error.remedy))
         why = "the file could not be read beyond the fault above"
         skipped = tuple((id, why) for id in _asked_of_all() if id != error.id)
         return Inspection(None, (finding,), (error.id,), skipped, source=Path(path), made=(finding,))

@@ -47,7 +47,7 @@ class Observed:
 
     @cached_property
     def residuals(self) -> Array:
-        """Observed less projected at the file's numbers, (views, corners, 2), also where a corner was set aside."""
+        """Detected less projected at the file's numbers, (views, corners, 2), also where a corner was set aside."""
         return self.adjustment.residuals[self.name]
 
     @cached_property

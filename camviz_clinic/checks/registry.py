@@ -14,6 +14,7 @@ from typing import Any, cast
 import numpy as np
 
 from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.types import CalibrationError
 from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.virtual import SetUp, single
 
@@ -176,6 +177,11 @@ class Kind:
         number = None if value is None else float(value)
         common = {name: getattr(self, name) for name in ("severity", "view", "causes", "remedy")}
         return Finding(self.id, sentence=sentence, value=number, unit=unit, camera=camera, **common | more)
+
+    def of_file(self, error: CalibrationError, unit: str = "") -> Finding:
+        """The finding that the reader of a file has noted as an error, with the remedy that the reader knows."""
+        own = {"remedy": error.remedy} if error.remedy else {}
+        return self.found(f"{error}.", error.value, unit, **own)
 
     def fault(
         self, name: str, unit: str, strengths: tuple[float, ...], **more: Any

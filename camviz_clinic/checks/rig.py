@@ -70,14 +70,19 @@ class StereoPair:
         return [int(view) for view in np.flatnonzero(both)]
 
     @cached_property
-    def by_view(self) -> RigidTransform | None:
-        """right_from_left of every such view, from the poses that each camera has of the board by itself."""
+    def alone(self) -> tuple[RigidTransform, RigidTransform] | None:
+        """cam_from_board of every such view, by the left and by the right camera alone."""
         if self.seen_from_both is None:
             return None
-        board = self.calibration.board
+        board, seen = self.calibration.board, self.seen_from_both
         assert board is not None
-        poses = [lone_poses(camera, board, self.seen_from_both[name]) for name, camera in self._named()]
-        return poses[1] * poses[0].inv()
+        left, right = (lone_poses(camera, board, seen[name]) for name, camera in self._named())
+        return left, right
+
+    @property
+    def by_view(self) -> RigidTransform | None:
+        """right_from_left of every such view, from the poses that each camera has of the board by itself."""
+        return None if self.alone is None else self.alone[1] * self.alone[0].inv()
 
     def _named(self) -> list[tuple[str, Camera]]:
         return list(zip((self.left, self.right), self.cameras, strict=True))
@@ -125,6 +130,13 @@ def lone_poses(camera: Camera, board: Board, pixels: Array) -> RigidTransform:
     start = board_poses(alone, board, pixels)
     problem = Adjustment(board, {"camera": alone}, {"camera": pixels}, start, {"camera": ()})
     return problem.refined(only_poses=True).first_from_board
+
+
+def corner_errors(camera: Camera, poses: RigidTransform, pixels: Array, board: Board) -> Array:
+    """How far corners (views, corners, 2) lie from where the board's poses put them: (views, corners) in pixels."""
+    alone = Camera(camera.intrinsics, camera.lens)
+    expected = np.stack([alone.project(pose.apply(board.corners)) for pose in poses])
+    return np.asarray(np.linalg.norm(expected - pixels, axis=-1))
 
 
 def middlemost(poses: RigidTransform) -> int:

@@ -27,7 +27,7 @@ from camviz_clinic.commands.corners import add_corners, corners_of
 from camviz_clinic.commands.films import FILMS, add_frames, as_pictures
 from camviz_clinic.commands.gate import EPILOG as GATE
 from camviz_clinic.commands.gate import add_gate, given_gate, refuse_junit
-from camviz_clinic.commands.outcome import judged, stamped, written
+from camviz_clinic.commands.outcome import judged, refuse_parallel, stamped, written
 from camviz_clinic.commands.pictures import Bar, pictures
 from camviz_clinic.commands.rig import (
     RIG,
@@ -196,6 +196,7 @@ def _of_stills(options: argparse.Namespace, of_films: tuple[str, ...]) -> int:
         calibration = _of_corners(left, right, options) if options.corners else _of_pictures(cameras, options)
     except CannotCalibrate as error:
         raise Refusal(_complaint(error, shots, options)) from error
+    refuse_parallel(calibration)
     calibration = replace(calibration, notes=(*of_films, *calibration.notes))
     calibration = stamped(calibration, calibration, list(cameras.values()), options)
     left_out = written(calibration, options, form)
@@ -207,7 +208,7 @@ def _of_stills(options: argparse.Namespace, of_films: tuple[str, ...]) -> int:
         told(sentence)
     if doctored := "" if options.rig or is_rolling(options) else _prescribed(shots, options, calibration):
         told(f"Is the board as described? {doctored}")
-    told(f"{options.output}: written.{left_out}")
+    told(f"{options.output}: written{left_out}.")
     return judged(calibration, dict(zip(calibration.cameras, folders.values(), strict=True)), options, gate)
 
 

@@ -11,6 +11,7 @@ import shutil
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -100,7 +101,7 @@ def loaded(path: Path, size: tuple[int, int] | None) -> Calibration:
 
     with on_disk(path) as file:
         try:
-            return load(file, size=size)
+            return replace(load(file, size=size), source=path)
         except CalibrationError as error:
             raise Refusal(str(error)) from error
 
@@ -189,17 +190,20 @@ def write_whole(path: Path, write: Callable[[Path], object], name: str = "page.p
         os.replace(temporary, target)
 
 
-def write_calibration(calibration: Calibration, output: Path, form: str) -> tuple[str, ...]:
-    """Write a calibration to a file or to stdout; what the format could not hold, in sentences."""
+def write_calibration(
+    calibration: Calibration, output: Path, form: str, whole: Calibration | None = None
+) -> tuple[str, ...]:
+    """Write a calibration to a file or to stdout; what of it, or of the `whole`, is lost: see `files.write`."""
+    from camviz_clinic.files.registry import written
     from camviz_clinic.files.writing import write
 
     if output != STREAM:
-        return write(calibration, output, form)
-    if form.startswith("colmap"):
-        raise Refusal(f"-: a {form} model is a folder, which stdout cannot hold.")
-    left_out: list[str] = []
-    write_whole(output, lambda path: left_out.extend(write(calibration, path, form)), "camera.yml")
-    return tuple(left_out)
+        return write(calibration, output, form, whole)
+    if form in written() and written()[form].is_folder(calibration):
+        raise Refusal(f"-: {written()[form].title} is a folder, which stdout cannot hold: name one.")
+    lost: list[str] = []
+    write_whole(output, lambda path: lost.extend(write(calibration, path, form, whole)), "camera.yml")
+    return tuple(lost)
 
 
 def refuse_exhausted(error: OSError) -> None:

@@ -26,8 +26,9 @@ CONVERT = """\
 Writes a calibration for another program. Pixels, lens and poses are carried from one set of conventions to the other
 (half pixels, axes, order of coefficients, which way a transform goes), and what is written is read back and compared
 before it takes its name: it says the same, or it is not written. A format that has no place for something in the
-cameras is refused with the reason; what it cannot hold beside them (corners, board poses, names) is named and left
-out. The format of IN is told by its content. A COLMAP model is a folder.
+cameras is refused with the reason; what else it cannot hold (corners, board poses, names, the other camera) is named
+where it says "written". The format of IN is told by its content. A COLMAP model is a folder, and so is a pair for ROS:
+a file for each camera, with stereoRectify's R and P.
 With --fit MODEL the lens is replaced by the one of that model that fits it best over the image, the error is said, and
 above --tolerance it is refused.
 With --to lut OUT is an archive of tables (.npz) for programs that know no lenses: maps for cv2.remap, that undistort,
@@ -45,6 +46,7 @@ examples:
   camviz convert camera.yml camera.cameramodel --to mrcal
   camviz convert - - --to ros < camera.yml > camera.yaml
   camviz convert stereo.yml chain.yaml --to kalibr --size 640x480
+  camviz convert stereo.yml camera_info --to ros
   camviz convert basalt.json camera.yaml --to ros --camera cam0 --fit fisheye --tolerance 0.05
   camviz convert camera.yml tables.npz --to lut --step 16 --alpha 1
   camviz convert sparse/0 left.yml --to opencv --camera left.jpg --first-as-world
@@ -55,7 +57,9 @@ def add(commands: Any) -> None:
     command = add_command(commands, "convert", convert, "write a calibration for another program", CONVERT)
     command.epilog, command.listing = EXAMPLES, _listing
     command.add_argument("file", metavar="IN", type=Path, help="the calibration, or the folder of a COLMAP model")
-    command.add_argument("output", metavar="OUT", type=Path, help="the file to write; for COLMAP a new folder")
+    command.add_argument(
+        "output", metavar="OUT", type=Path, help="the file to write; for COLMAP, and a pair for ROS, a new folder"
+    )
     command.add_argument("--to", metavar="FORMAT", required=True, help="one of the formats below, or lut")
     command.add_argument("--size", metavar="WxH", type=size, help="image size in pixels, where IN does not hold it")
     command.add_argument("--camera", metavar="NAME", help="only this one of the cameras")
@@ -90,7 +94,7 @@ def _listing() -> str:
 
 def convert(options: argparse.Namespace) -> int:
     """Write a calibration in another format, whole or not at all."""
-    calibration = loaded(options.file, options.size)
+    whole = calibration = loaded(options.file, options.size)
     if options.output.exists() and options.output.samefile(options.file):
         raise Refusal(f"{options.output}: this would overwrite the calibration; choose another name.")
     from camviz_clinic.files import CalibrationError
@@ -112,7 +116,7 @@ def convert(options: argparse.Namespace) -> int:
         if fitted:
             cameras = {name: fit.camera for name, fit in fitted}
             calibration = replace(calibration, cameras=cameras, intrinsics_covariance={}, estimated={}, priors={})
-        said = _tabulated(calibration, options) if options.to == LUT else _converted(calibration, options)
+        said = (_tabulated if options.to == LUT else _converted)(calibration, whole, options)
     except CalibrationError as error:
         raise Refusal(str(error)) from error
     told = narrator(options.output)
@@ -123,10 +127,12 @@ def convert(options: argparse.Namespace) -> int:
     return OK
 
 
-def _converted(calibration: Calibration, options: argparse.Namespace) -> tuple[str, ...]:
+def _converted(calibration: Calibration, whole: Calibration, options: argparse.Namespace) -> tuple[str, ...]:
     """The calibration written; what there is to say of it."""
-    left_out = write_calibration(calibration, options.output, options.to)
-    return (*left_out, f"{options.output}: written from {calibration.format}, read back and found the same.")
+    from camviz_clinic.files.writing import without
+
+    lost = write_calibration(calibration, options.output, options.to, whole)
+    return (f"{options.output}: written from {whole.format}, read back and found the same{without(lost)}.",)
 
 
 def _refuse_stray(options: argparse.Namespace) -> None:
@@ -136,10 +142,11 @@ def _refuse_stray(options: argparse.Namespace) -> None:
             raise Refusal(f"--{name} belongs to --to lut, got --to {options.to}.")
 
 
-def _tabulated(calibration: Calibration, options: argparse.Namespace) -> tuple[str, ...]:
+def _tabulated(calibration: Calibration, whole: Calibration, options: argparse.Namespace) -> tuple[str, ...]:
     """The tables of the one camera written; what there is to say of them."""
     from camviz_clinic.files import CalibrationError
     from camviz_clinic.files.lookup_tables import STEP, LookupTables
+    from camviz_clinic.files.writing import lost_poses, without
 
     if len(calibration.cameras) > 1:
         names = ", ".join(calibration.cameras)
@@ -160,7 +167,18 @@ def _tabulated(calibration: Calibration, options: argparse.Namespace) -> tuple[s
         f"map_x, map_y: to {K.width}×{K.height} pixels with fx = {K.fx:.2f}, fy = {K.fy:.2f}, "
         f"cx = {K.cx:.2f}, cy = {K.cy:.2f}.",
         f"rays: every {step:.3g} px; read bilinearly they are {sizes}.",
-        f"{options.output}: written from {calibration.format}.",
+        *_without_ray(name, off.share),
+        f"{options.output}: written from {calibration.format}{without(lost_poses(calibration, whole))}.",
+    )
+
+
+def _without_ray(name: str, fraction_with_ray: float) -> tuple[str, ...]:
+    """A warning where the table lacks rays."""
+    if fraction_with_ray == 1:
+        return ()
+    lost = f"{1 - fraction_with_ray:.2%}".replace("%", " %")
+    return (
+        f"warning: {name}: {lost} of the pixels have no ray; `rays` is NaN there. `camviz inspect` names the cause.",
     )
 
 

@@ -152,6 +152,8 @@ def _case(calibration: Calibration, options: argparse.Namespace) -> tuple[PosedP
     except CannotCalibrate as error:
         raise Refusal(f"{error}.") from error
     _refuse_size(found, camera)
+    if not poses.names and len(paths) != len(poses.base_from_hand):
+        _refuse_count(poses, found, camera, board, paths, options)
     used = sorted({row for row in rows if row is not None})
     skipped = [(path.name, "the table has no row for it") for path, row in zip(paths, rows, strict=True) if row is None]
     if len(used) < len(poses.base_from_hand):
@@ -172,12 +174,28 @@ def _rows(poses: RobotPoses, paths: list[Path], options: argparse.Namespace) -> 
         if all(row is None for row in rows):
             raise Refusal(f"{options.poses}: no row names one of the pictures, such as {paths[0].name}.")
         return rows
-    if len(paths) != len(poses.base_from_hand):
-        raise Refusal(
-            f"{options.poses}: there are {len(poses.base_from_hand)} poses and {len(paths)} pictures: name the "
-            "pictures in a column `picture`, or give as many of the one as of the other."
-        )
     return list(range(len(paths)))
+
+
+def _refuse_count(
+    poses: RobotPoses, found: Detections, camera: Camera, board: Board, paths: list[Path], options: argparse.Namespace
+) -> None:
+    """Refuses tables without names and with another number of rows; says which row or picture seems to be missing."""
+    from camviz.cameras import Camera
+    from camviz_clinic.checks.rig import lone_poses
+    from camviz_clinic.handeye.mends import FEWEST_TRIED, row_shifts, shift_words
+
+    said, places, shifts = "", np.array(found.places, dtype=int), None
+    if len(places) >= FEWEST_TRIED:
+        boards = lone_poses(Camera(camera.intrinsics, camera.lens), board, found.corners)
+        shifts = row_shifts(poses.base_from_hand, places, boards)
+    if shifts is not None:
+        says, remedy = shift_words(shifts, places, lambda place: paths[place].name)
+        said = f" The hand turned as the boards did if {says}. {remedy}"
+    raise Refusal(
+        f"{options.poses}: there are {len(poses.base_from_hand)} poses and {len(paths)} pictures: name the "
+        f"pictures in a column `picture`, or give as many of the one as of the other.{said}"
+    )
 
 
 def _pixels(found: Detections, board: Board, rows: list[int | None], count: int) -> Array:

@@ -50,12 +50,27 @@ def stamped(
     return replace(calibration, stamps=stamps, notes=(*calibration.notes, *notes))
 
 
+def refuse_parallel(calibration: Calibration) -> None:
+    """Refuses a camera whose boards are all parallel, so that any focal length fits its corners."""
+    from camviz_clinic.checks.evidence import Evidence
+    from camviz_clinic.checks.findings.boards import leave_focal_length_open, parallel_boards, tilt_spread_deg
+
+    evidence = Evidence(calibration)
+    for name, poses in evidence.cam_from_board.items():
+        if leave_focal_length_open(evidence, name):
+            raise Refusal(
+                f"{name}: all {len(poses)} boards are parallel within {tilt_spread_deg(evidence, name):.1f}°, so that "
+                f"the corners do not determine the focal length. {parallel_boards.remedy}"
+            )
+
+
 def written(calibration: Calibration, options: argparse.Namespace, form: str) -> str:
-    """Writes it; what the format could not hold, in sentences after a space."""
+    """Writes it; what the format could not hold, as the end of the sentence that says "written"."""
     from camviz_clinic.files import CalibrationError
+    from camviz_clinic.files.writing import without
 
     try:
-        return "".join(f" {sentence}" for sentence in write_calibration(calibration, options.output, form))
+        return without(write_calibration(calibration, options.output, form))
     except CalibrationError as error:
         raise Refusal(str(error)) from error
     except OSError as error:

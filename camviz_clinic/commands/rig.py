@@ -62,8 +62,8 @@ def format_of_rig(options: argparse.Namespace) -> str:
     name = options.to or TO
     if name not in known:
         raise Refusal(f"--to: expected one of {', '.join(known)}, got {name!r}.")
-    if known[name].most_cameras == 1:
-        raise Refusal(f"--to {name}: {known[name].title} holds one camera, not a rig.")
+    if known[name].most_cameras == 1 or known[name].rectifies:
+        raise Refusal(f"--to {name}: {known[name].title} holds {known[name].holds}, not a rig.")
     return name
 
 

@@ -122,7 +122,7 @@ def calibrate_several(
     left_out, told = written(calibration, options, form), narrator(options.output)
     for sentence in [*told_of(solved, file), *calibration.notes]:
         told(sentence)
-    told(f"{options.output}: written.{left_out}")
+    told(f"{options.output}: written{left_out}.")
     if options.places:
         write_whole(options.places, lambda path: path.write_text(places_toml(solved, file), encoding="utf-8"))
         told(f"{options.places}: written; --boards reads it.")

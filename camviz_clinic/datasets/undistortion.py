@@ -41,8 +41,8 @@ class Undistortion:
     def of(cls, camera: Camera, alpha: float = 0.0) -> Undistortion:
         """The undistortion from no black border (`alpha` 0) to every pixel of the photograph (1).
 
-        Focal lengths and principal point are OpenCV's choice for its plain lenses. With a fisheye the pictures keep
-        the principal point and fx : fy of the photographs, as a wide field would be shifted and stretched by far.
+        Pixels are square: fx = fy. A plain lens shows the rectangle of OpenCV's choice in the middle of the picture.
+        With a fisheye the pictures keep the principal point of the photographs: a wide field would be shifted by far.
 
         Args:
             camera: With any lens.
@@ -50,7 +50,7 @@ class Undistortion:
 
         Raises: ValueError where no picture of a pinhole shows what the camera sees, and for another alpha.
         """
-        target, _ = undistorted_intrinsics(camera, alpha)
+        target, _ = undistorted_intrinsics(camera, alpha, square=True)
         return cls(camera, target if isinstance(camera.lens, STRAIGHT) else _scaled(camera, alpha))
 
     @property
@@ -99,14 +99,13 @@ class Undistortion:
 
 
 def _scaled(camera: Camera, alpha: float) -> Intrinsics:
-    """The camera's own K with its focal lengths times s: the largest s that is needed for 0, the smallest for 1."""
+    """The camera's own principal point and one focal length: the largest that is needed for 0, the smallest for 1."""
     (inner, outer), grid = (_reach(camera, each) for each in (0.0, 1.0)), camera.intrinsics
     sides = np.array([grid.cx, grid.cy, grid.width - 1 - grid.cx, grid.height - 1 - grid.cy])
-    focal = np.array([grid.fx, grid.fy, grid.fx, grid.fy])
     if not ((sides > 0).all() and (inner > 0).all()):
         raise ValueError("the principal point of a fisheye must lie inside the picture, to be kept there")
-    s = float((1 - alpha) * np.max(sides / inner / focal) + alpha * np.min(sides / outer / focal))
-    return replace(grid, fx=s * grid.fx, fy=s * grid.fy, skew=0.0)
+    f = float((1 - alpha) * np.max(sides / inner) + alpha * np.min(sides / outer))
+    return replace(grid, fx=f, fy=f, skew=0.0)
 
 
 def _reach(camera: Camera, alpha: float) -> Array:

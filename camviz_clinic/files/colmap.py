@@ -45,7 +45,7 @@ def cameras_file(path: Path, ending: str) -> Path | None:
 
 def is_model(file: File) -> object:
     """True for a model's folder and files, and for lines of a number, a camera model, a width and a height."""
-    return cameras_file(file.path, ".txt") or _CAMERA_LINE.match(file.text[:HEAD])
+    return cameras_file(file.path, ".txt") or (not file.path.is_dir() and _CAMERA_LINE.match(file.text[:HEAD]))
 
 
 def read(file: File) -> Calibration:
@@ -227,6 +227,7 @@ FORMAT = Format(
     read=read,
     write=write,
     own_world=True,
+    folder_from=1,
     models=f"{listed(WRITTEN)}; SIMPLE_FISHEYE and FISHEYE are read too",
     says="first pixel's centre at (0.5, 0.5); quaternion w x y z, world → camera; no unit",
     lacks="skew, thin prisms of a lens that is no fisheye, names with spaces",

@@ -94,6 +94,8 @@ class Format:
         endings: Where these choose between forms, `write` takes the ending as its second argument.
         most_cameras: How many cameras such a file holds at most.
         own_world: Whether the first camera may stand elsewhere than in the world's origin.
+        folder_from: From how many cameras on it is a folder of files; 0 where it is always one file.
+        rectifies: Whether a camera of a pair is written with R and P, so that one alone would lose the other.
         models: The camera models it has.
         says: Its own conventions, in which it differs from ours.
         lacks: What beside `most_cameras` and `own_world` it has no place for.
@@ -114,6 +116,8 @@ class Format:
     endings: tuple[str, ...] = ()
     most_cameras: int | None = None
     own_world: bool = False
+    folder_from: int = 0
+    rectifies: bool = False
     models: str = ""
     says: str = ""
     lacks: str = ""
@@ -125,6 +129,10 @@ class Format:
         """How many cameras there is room for, in words; empty where there is no limit."""
         counts = {1: "one camera", 2: "one camera or a pair", None: ""}
         return counts.get(self.most_cameras, f"at most {self.most_cameras} cameras")
+
+    def is_folder(self, calibration: Calibration) -> bool:
+        """Whether a calibration is written as a folder."""
+        return 0 < self.folder_from <= len(calibration.cameras)
 
     def content(self, calibration: Calibration, ending: str) -> Content:
         """What is written of a calibration.

@@ -62,7 +62,8 @@ def format_of(file: File) -> Format:
     'kitti'
     """
     try:
-        for format in sorted(formats().values(), key=lambda format: format.rank):
+        candidates = [format for format in formats().values() if format.folder_from or not file.path.is_dir()]
+        for format in sorted(candidates, key=lambda format: format.rank):
             if format.recognise(file):
                 return format
         keys = [shown(key) for key in list(file.section.values)[:6]]

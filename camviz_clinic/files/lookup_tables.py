@@ -102,11 +102,11 @@ class LookupTables:
 
     @classmethod
     def of(cls, camera: Camera, step: float = STEP, alpha: float = 0.0) -> LookupTables:
-        """Of the undistorted picture that shows no black border (`alpha` 0) up to every pixel (1), and rays.
+        """Of the undistorted picture with square pixels, from no black border (`alpha` 0) to every pixel (1), and rays.
 
         Raises ValueError where a perspective picture cannot show what the camera sees, and for a wrong step or alpha.
         """
-        target, _ = undistorted_intrinsics(camera, alpha)
+        target, _ = undistorted_intrinsics(camera, alpha, square=True)
         map_x, map_y = (np.nan_to_num(each, nan=NOWHERE) for each in undistort_maps(camera, target))
         table = RayTable.of(camera, step)
         return cls((map_x, map_y), target, table, table_error(camera, table))

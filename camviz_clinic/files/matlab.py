@@ -16,7 +16,7 @@ from camviz_clinic.calibration.types import Calibration
 from camviz_clinic.files.format import File, Format
 from camviz_clinic.files.models import expressed, models_of
 from camviz_clinic.files.output import as_json
-from camviz_clinic.files.section import Section, Size, agreed_size, explained
+from camviz_clinic.files.section import Section, Size, agreed_size, explained, refuse_focal_lengths
 
 TITLE = "MATLAB cameraParameters"
 FIRST_PIXEL = 1.0
@@ -84,6 +84,7 @@ def _intrinsics(section: Section, size: Size) -> Intrinsics:
         fx, fy = section.vector("FocalLength", [2], "fx fy")
         cx, cy = section.vector("PrincipalPoint", [2], "cx cy")
         skew = section.number("Skew") if "Skew" in section else 0.0
+        refuse_focal_lengths(fx, fy, section.where("FocalLength"))
     else:
         key = "IntrinsicMatrix" if "IntrinsicMatrix" in section else "K"
         matrix, where = section.matrix(key, 3, 3), section.where(key)

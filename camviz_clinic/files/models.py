@@ -11,7 +11,7 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import Lens, same_lenses, spelled
 from camviz_clinic.calibration.types import CalibrationError
-from camviz_clinic.files.section import explained
+from camviz_clinic.files.section import explained, refuse_focal_lengths
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,7 @@ class Model:
         focal = held.pop("f", None)
         fx, fy = (held.pop(name, focal) for name in ("fx", "fy"))
         cx, cy = held.pop("cx") - first_pixel, held.pop("cy") - first_pixel
+        refuse_focal_lengths(fx, fy, where)  # type: ignore[arg-type]
         with explained(where):
             intrinsics = Intrinsics(width, height, fx, fy, cx, cy, held.pop("skew", 0.0))  # type: ignore[arg-type]
             return Camera(intrinsics, self.lens(**held))
@@ -89,10 +90,11 @@ def equals(camera: Camera) -> Iterator[Camera]:
 
 def same_camera(a: Camera, b: Camera, tolerance: float = 1e-11) -> bool:
     """True where both have the same pixels, the same lens under one name or another, and the same pose."""
-    return _same_pose(a, b, tolerance) and any(_same_values(form, b, tolerance) for form in equals(a))
+    return same_pose(a, b, tolerance) and any(_same_values(form, b, tolerance) for form in equals(a))
 
 
-def _same_pose(a: Camera, b: Camera, tolerance: float) -> bool:
+def same_pose(a: Camera, b: Camera, tolerance: float = 1e-11) -> bool:
+    """True where both stand in one place and look one way."""
     first, second = a.world_from_cam.as_matrix(), b.world_from_cam.as_matrix()
     return bool(np.abs(first - second).max() <= tolerance * max(1.0, float(np.abs(first).max())))
 

@@ -10,7 +10,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from camviz.cameras import Camera
-from camviz.lenses import BrownConrady, KannalaBrandt, Lens, UnifiedSphere
+from camviz.lenses import BrownConrady, KannalaBrandt, Lens, Perspective, UnifiedSphere
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.denominator_prior import DenominatorPrior
@@ -19,7 +19,7 @@ from camviz_clinic.calibration.stamp import LONGEST, Stamp
 from camviz_clinic.calibration.types import Board, Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format
 from camviz_clinic.files.opencv_redundancy import redundancies
-from camviz_clinic.files.opencv_writing import TITLE, write
+from camviz_clinic.files.opencv_writing import TITLE, UNDISTORTED, write
 from camviz_clinic.files.section import Section, Size, agreed_size, explained
 
 # Spellings are compared without capitals and underscores: Camera_Matrix, cameraMatrix and camera_matrix are one.
@@ -127,7 +127,8 @@ def _lens(section: Section, tag: str) -> Lens:
             return UnifiedSphere(section.number(xi), *section.coefficients(key, [4], "k1 k2 p1 p2 of cv2.omnidir"))
         if _is_fisheye(section):
             return KannalaBrandt(*section.coefficients(key, [4], "k1 k2 k3 k4 of cv2.fisheye"))
-        return BrownConrady.from_coefficients(section.coefficients(key, [4, 5, 8, 12, 14], "k1 k2 p1 p2 k3 …"))
+        lens = BrownConrady.from_coefficients(section.coefficients(key, [4, 5, 8, 12, 14], "k1 k2 p1 p2 k3 …"))
+        return Perspective() if section.values.get(UNDISTORTED) in (1, "1") and lens == BrownConrady() else lens
 
 
 def _is_fisheye(section: Section) -> bool:
@@ -335,7 +336,8 @@ FORMAT = Format(
     write=write,
     endings=(".yml", ".xml", ".json"),
     most_cameras=2,
-    models="5, 8, 12, 14 coefficients; `fisheye_model: 1` or VOXL's `distortion_model: fisheye`; `xi` of omnidir",
+    models="5, 8, 12, 14 coefficients; `fisheye_model: 1` or VOXL's `distortion_model: fisheye`; `xi` of omnidir; "
+    "`undistorted: 1` of a pinhole",
     says="X_right = R X_left + T",
     lacks="skew (but for omnidir)",
     rank=80,

@@ -10,7 +10,7 @@ from urllib.parse import quote
 import numpy as np
 
 from camviz.cameras import Camera
-from camviz.lenses import KannalaBrandt
+from camviz.lenses import KannalaBrandt, Perspective
 from camviz_clinic.calibration.stamp import Stamp
 from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.models import expressed, models_of
@@ -19,11 +19,15 @@ GUESSED = ("chessboard", "charuco")  # kinds of boards that the reader knows by 
 MODELS = models_of("opencv")
 NO_STAMP = Stamp()
 TITLE = "OpenCV FileStorage"
+UNDISTORTED = "undistorted"  # 1 in the file of pinholes, whose zeros are no forgotten coefficients
 
 
 def write(calibration: Calibration, ending: str) -> bytes:
     """In the form that the ending asks for, YAML where it asks for none."""
-    return _stored(_pair(calibration) if len(calibration.cameras) == 2 else _one(calibration), ending)
+    values = _pair(calibration) if len(calibration.cameras) == 2 else _one(calibration)
+    if all(isinstance(camera.lens, Perspective) for camera in calibration.cameras.values()):
+        values[UNDISTORTED] = 1
+    return _stored(values, ending)
 
 
 def _one(calibration: Calibration) -> dict[str, Any]:

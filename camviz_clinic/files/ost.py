@@ -9,7 +9,7 @@ from camviz.cameras import Camera
 from camviz.lenses import BrownConrady, KannalaBrandt
 from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format
-from camviz_clinic.files.ros import stereo_note
+from camviz_clinic.files.ros import rectification, stereo_note
 from camviz_clinic.files.section import Section, agreed_size, explained
 from camviz_clinic.files.text import HEAD
 from camviz_clinic.files.trees import scalar
@@ -33,7 +33,9 @@ def read(file: File) -> Calibration:
         lens = KannalaBrandt(*values) if len(values) == 4 else BrownConrady.from_coefficients(values)
     if "projection" in section:
         notes += stereo_note(section, "projection")
-    return Calibration({name: Camera(grid, lens)}, file.path, TITLE, notes=tuple(notes))
+    camera = Camera(grid, lens)
+    matrices = rectification(section, name, camera, ("rectification",), ("projection",))
+    return Calibration({name: camera}, file.path, TITLE, notes=tuple(notes), rectifications=matrices)
 
 
 def _lines(file: File) -> tuple[Section, str]:

@@ -23,6 +23,12 @@ LARGEST_SIDE = 32768  # pixels
 ROTATION_TOLERANCE = 1e-3  # of R Rᵀ = 1, for files written with few digits
 Size = tuple[int, int]  # width and height in pixels
 NOT_A_ROTATION, BAD_K, COUNT = "not-a-rotation", "bad-k", "coefficient-count"  # findings of the clinic
+NOT_CALIBRATED, REVERSED_AXIS = "not-calibrated", "reversed-axis"  # these, too
+REVERSED = {  # what negative focal lengths mean, and which coefficient changes its sign with them
+    "fx": ("the x axis points left, or the camera looks along -z with y up (OpenGL)", "p2"),
+    "fy": ("the y axis points up (OpenGL)", "p1"),
+    "fx and fy": ("x points left and y up (PyTorch3D), or the picture is turned by 180°", "p1 and p2"),
+}
 
 
 class MissingSizeError(CalibrationError):
@@ -47,9 +53,11 @@ class Section:
         """The path of keys that leads to this one."""
         return f"{self.path}.{key}" if self.path else key
 
-    def error(self, key: str, expected: str, got: Any, id: str = "", value: float | None = None) -> CalibrationError:
+    def error(
+        self, key: str, expected: str, got: Any, id: str = "", value: float | None = None, remedy: str = ""
+    ) -> CalibrationError:
         """What is wrong under a key: what was expected there and what came."""
-        return CalibrationError(f"{self.where(key)}: expected {expected}, got {got}", id, value)
+        return CalibrationError(f"{self.where(key)}: expected {expected}, got {got}", id, value, remedy)
 
     def mend(self, error: CalibrationError) -> None:
         """Notes the error where this file is to be read in spite of it; otherwise raises it."""
@@ -145,7 +153,8 @@ class Section:
         values = np.atleast_1d(self.array(key))
         if values.size not in lengths or max(values.shape, default=0) != values.size:
             takes = " or ".join(filter(None, [", ".join(map(str, lengths[:-1])), str(lengths[-1])]))
-            raise self.error(key, f"{takes} numbers ({meaning})", _shape(values), id, values.size)
+            remedy = without_zeros(values.ravel(), lengths) if id == COUNT else ""
+            raise self.error(key, f"{takes} numbers ({meaning})", _shape(values), id, values.size, remedy)
         return [float(value) for value in values.ravel()]
 
     def coefficients(self, key: str, lengths: Sequence[int], meaning: str, others: Sequence[int] = ()) -> list[float]:
@@ -194,12 +203,14 @@ class Section:
     def intrinsics(self, K: Array, where: str, size: Size) -> Intrinsics:
         """Those of K (3, 3), upper triangular with K[2, 2] = 1; mended by transposing and by dividing."""
         with explained(where, BAD_K):
+            refuse_zero(K[0, 0], K[1, 1], where)
             if not _is_camera_matrix(K):
                 good, error = _good_camera_matrix(K), _bad_camera_matrix(K, where)
                 if good is None:
                     raise error
                 self.mend(error)
                 K = good
+            refuse_focal_lengths(K[0, 0], K[1, 1], where)
             return Intrinsics.from_matrix(K, *size)
 
     def _rotation(self, matrix: Array, key: str) -> Rotation:
@@ -239,7 +250,7 @@ def named(where: object) -> Iterator[None]:
     try:
         yield
     except CalibrationError as error:
-        raise type(error)(f"{where}: {error}", error.id, error.value) from error.__cause__
+        raise type(error)(f"{where}: {error}", error.id, error.value, error.remedy) from error.__cause__
 
 
 @contextmanager
@@ -251,6 +262,32 @@ def explained(where: str, id: str = "") -> Iterator[None]:
         raise
     except ValueError as error:
         raise CalibrationError(f"{where}: {error}", id) from error
+
+
+def without_zeros(values: Array, lengths: Sequence[int]) -> str:
+    """The remedy for too many coefficients whose last are 0, in a sentence; empty where it leads to no length."""
+    used = len(np.trim_zeros(values, "b"))
+    fitting = [length for length in sorted(lengths) if used <= length < len(values)]
+    extra = len(values) - fitting[0] if fitting else 0
+    which = f"the last {extra} numbers, which are" if extra > 1 else "the last number, which is"
+    return f"Delete {which} 0: the camera stays the same." if fitting else ""
+
+
+def refuse_focal_lengths(fx: float, fy: float, where: str) -> None:
+    """Raise CalibrationError for a focal length in pixels that is 0 or negative, saying what that means."""
+    refuse_zero(fx, fy, where)
+    negative = " and ".join(name for name, f in (("fx", fx), ("fy", fy)) if f < 0)
+    if negative:
+        meaning, tangential = REVERSED[negative]
+        text = f"{where}: expected positive focal lengths, got fx = {fx:g} and fy = {fy:g} px: {meaning}"
+        remedy = f"Write {negative} without the minus, and change the sign of {tangential} (Brown's lens). "
+        raise CalibrationError(text, REVERSED_AXIS, min(fx, fy), f"{remedy}Reverse the same axes in its poses.")
+
+
+def refuse_zero(fx: float, fy: float, where: str) -> None:
+    """Raise CalibrationError for a focal length of 0, which a camera has before it is calibrated."""
+    if zero := [name for name, f in (("fx", fx), ("fy", fy)) if f == 0]:
+        raise CalibrationError(f"{where}: {' = '.join(zero)} = 0: the camera is not calibrated", NOT_CALIBRATED, 0.0)
 
 
 def as_rotation(matrix: Array, where: str) -> Rotation:
@@ -277,7 +314,14 @@ def _bad_camera_matrix(K: Array, where: str) -> CalibrationError:
     turned = " (its transpose is)" if _is_camera_matrix(K.T) else ""
     text = f"{where}: K must be upper triangular with K[2, 2] = 1{turned}, got {K.tolist()}"
     off = K[2, 2] if K[2, 2] != 1 else K[2, 0] or K[2, 1] or K[1, 0]
-    return CalibrationError(text, BAD_K, float(off))
+    return CalibrationError(text, BAD_K, float(off), _good_form(K))
+
+
+def _good_form(K: Array) -> str:
+    """What makes a camera matrix of K, in a sentence; empty where nothing does."""
+    steps = ["Transpose K"] * bool(K[2, :2].any()) + [f"divide K by K[2, 2] = {K[2, 2]:g}"] * bool(K[2, 2] != 1)
+    done = " and ".join(steps)
+    return f"{done[0].upper()}{done[1:]}." if _good_camera_matrix(K) is not None else ""
 
 
 def _good_camera_matrix(K: Array) -> Array | None:

@@ -17,7 +17,7 @@ from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format
 from camviz_clinic.files.models import expressed, models_of
 from camviz_clinic.files.output import as_json, as_rows
-from camviz_clinic.files.section import Section, Size, agreed_size, explained
+from camviz_clinic.files.section import Section, Size, agreed_size, explained, refuse_focal_lengths
 from camviz_clinic.files.trees import shown
 
 TITLE = "transforms.json"
@@ -69,6 +69,7 @@ def _camera(section: Section, given: Size | None) -> Camera:
     fx = _focal_length(section, "fl_x", "camera_angle_x", width)
     fy = _focal_length(section, "fl_y", "camera_angle_y", height, fx)
     cx, cy = (section.number(key) if key in section else side / 2 for key, side in (("cx", width), ("cy", height)))
+    refuse_focal_lengths(fx, fy, section.path or "the intrinsics")
     with explained(section.path or "the intrinsics"):
         return Camera(Intrinsics(width, height, fx, fy, cx - FIRST_PIXEL, cy - FIRST_PIXEL), _lens(section))
 

@@ -1,4 +1,4 @@
-"""What is wrong with a robot's poses, by the pictures that belong to them."""
+"""What is wrong with a robot's poses, by the pictures that belong to them: long because a finding rules out others."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from camviz.cameras import Camera
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
-from camviz_clinic.calibration.motions import FEWEST, PoseError, Turning
+from camviz_clinic.calibration.motions import FEWEST, PoseError, Turning, angles
 from camviz_clinic.calibration.problem import LEAST_CORNERS
 from camviz_clinic.calibration.types import Board
 from camviz_clinic.checks.registry import SEVERITIES, Finding
@@ -20,18 +20,32 @@ from camviz_clinic.handeye import mends
 from camviz_clinic.handeye.delay import Delay, delay
 from camviz_clinic.handeye.mends import FEWEST_TRIED, UNITS, Indices, Tried, exchanged
 from camviz_clinic.handeye.pose_table import RobotPoses
-from camviz_clinic.handeye.solving import HandEye, hand_eye_from_corners
+from camviz_clinic.handeye.solving import MOST_STRAY, UNKNOWN_DEG, HandEye, hand_eye_from_corners
 
 LITTLE_DEG = 10.0  # turned less about every second axis, X's translation is known badly
 SURE = 4.0  # σ: what a scale must be away from 1
 OFF = 0.005  # and how far
 DISAGREE = 0.01  # of the distance to the board: robots and pictures are nearer than that
+SAME_POSE_MM, SAME_POSE_DEG = 0.1, 0.01  # robots at rest scatter less from reading to reading
+MIN_BOARD_MOTION = 0.05  # of the distance to the board: pictures of a board that did not move are nearer
+BOARD_MOVED = "the board moved, with its turns counted at its distance, by up to"
+STILL_BOARD_DEG = 3.0  # RMS: boards of pictures that did not turn are turned less by their noise
 MENDS = ("wrong-unit", "poses-inverted", "poses-shifted", "poses-reordered", "poses-misread")
-KINDS = (*MENDS, "time-offset", "one-axis", "little-turning", "stray-pose", "scale-differs", "robot-disagrees")
+KINDS = (
+    "poses-repeated",
+    *MENDS,
+    "time-offset",
+    "one-axis",
+    "little-turning",
+    "stray-pose",
+    "scale-differs",
+    "robot-disagrees",
+)
 CAUSES = {
+    "poses-repeated": ("a pose that was read once and written again", "a controller that was read before it moved"),
     "wrong-unit": ("lengths in another unit than they were read in",),
     "poses-inverted": ("poses of the base in the hand's frame", "the other arrangement of camera and board"),
-    "poses-shifted": ("a picture or a row that is missing at the start",),
+    "poses-shifted": ("a picture or a row that is missing",),
     "poses-reordered": ("pictures sorted otherwise than the poses",),
     "poses-misread": ("another convention of rotations than was assumed",),
     "time-offset": ("clocks of robot and camera that differ", "a robot that moved while pictures were taken"),
@@ -99,7 +113,8 @@ class PosedPictures:
     def readings(self) -> tuple[Tried, Tried]:
         """The poses as given, and the reading under which robot and pictures agree best."""
         rows, others = self.poses.base_from_hand, self.poses.others
-        return mends.likely(rows, self.seen, self.cam_from_board, others, self.eye_to_hand, self.any_scale)
+        boards = self.cam_from_board
+        return mends.likely(rows, self.seen, boards, others, self.eye_to_hand, self.any_scale, self.named)
 
     @cached_property
     def delay(self) -> Delay | None:
@@ -127,10 +142,21 @@ class PosedPictures:
 
     @cached_property
     def findings(self) -> tuple[Finding, ...]:
-        """What is wrong, the worst first. Where another reading mends it, nothing but that is told."""
-        mended = tuple(self._mended())
-        found = mended or (*self._turning(), *self._stray(), *self._scale(), *self._disagreement())
+        """What is wrong, the worst first; nothing but that where poses are stale or another reading mends it."""
+        stale = tuple(self._repeated())
+        if any(each.severity == "fault" for each in stale):
+            return stale
+        if self._still:
+            return tuple(self._turning())
+        found = (*stale, *(tuple(self._mended()) or self._of_solution()))
         return tuple(sorted(found, key=lambda each: SEVERITIES.index(each.severity)))
+
+    def _of_solution(self) -> tuple[Finding, ...]:
+        """What the solution shows; a disagreement is told once."""
+        turning = (*self._turning(), *self._stray())
+        if any(each.id == "robot-disagrees" for each in turning):
+            return turning
+        return (*turning, *self._scale(), *self._disagreement())
 
     @property
     def checked(self) -> tuple[str, ...]:
@@ -149,6 +175,8 @@ class PosedPictures:
             said.append(("time-offset", "the poses have no column `time`"))
         elif self.delay is None:
             said.append(("time-offset", "the times do not rise from row to row, or are too few"))
+        if any(each.id == "poses-repeated" and each.severity == "fault" for each in self.findings):
+            said += [(id, "the poses must be recorded anew") for id in KINDS[1:] if id not in dict(said)]
         if self._mended_at_all:
             ids = ("one-axis", "little-turning", "stray-pose", "scale-differs", "robot-disagrees")
             said += [(id, "the poses must be mended first") for id in ids if id not in dict(said)]
@@ -166,6 +194,73 @@ class PosedPictures:
     def named(self, row: int) -> str:
         """A row in words."""
         return f"pose {row + 1}" + (f" ({self.pictures[row]})" if self.pictures else "")
+
+    @cached_property
+    def _turned_deg(self) -> tuple[float, float]:
+        """How far the hand and the boards turned by themselves, RMS about the main axis."""
+        robot, boards = self.poses.base_from_hand[self.seen].rotation, self.cam_from_board.rotation.inv()
+        return float(Turning.of(robot).deg[0]), float(Turning.of(boards).deg[0])
+
+    @property
+    def _still(self) -> bool:
+        """Whether neither hand nor boards turned, so that no order or form of the poses can be told from another."""
+        robot, boards = self._turned_deg
+        return robot < UNKNOWN_DEG and boards < STILL_BOARD_DEG
+
+    def _repeated(self) -> Iterator[Finding]:
+        """Rows that repeat one pose of the robot though the board moved."""
+        A, count = self.poses.base_from_hand[self.seen], len(self.seen)
+        first = _first_alike(A)
+        groups = [np.flatnonzero(first == one) for one in np.unique(first)]
+        moved = [_apart(self.cam_from_board[group]) for group in groups]
+        stale = [(g, by) for g, by in zip(groups, moved, strict=True) if len(g) > 1 and by > self._board_motion]
+        repeats = sum(len(group) - 1 for group, _ in stale)
+        robot, boards = self._turned_deg
+        if len(groups) == 1:
+            sentence = f"All {self._alike_rows} robot poses are the same; {BOARD_MOVED} {_length(moved[0])}."
+        elif len(groups) < FEWEST:
+            sentence = f"The {count} rows hold only {len(groups)} different robot poses; at least {FEWEST} are needed."
+        elif robot < SAME_POSE_DEG and boards > STILL_BOARD_DEG:
+            sentence = (
+                f"The robot's rotation is the same in all {count} rows; the boards turned by {boards:.2g}° (RMS)."
+            )
+        elif stale:
+            rows = "; ".join(self._rows_in_words(group) for group, _ in stale[:3])
+            more = f" and {len(stale) - 3} more groups" * (len(stale) > 3)
+            apart = _length(max(by for _, by in stale))
+            sentence = f"Rows repeat one robot pose: {rows}{more}; meanwhile {BOARD_MOVED} {apart}."
+        else:
+            return
+        whole = not stale or len(groups) < FEWEST or repeats > MOST_STRAY * count
+        yield Finding(
+            "poses-repeated",
+            "fault" if whole else "warning",
+            sentence,
+            float(repeats or count),
+            "poses",
+            causes=CAUSES["poses-repeated"],
+            remedy="Read the robot's pose anew when it has come to rest at each picture, or leave these rows out.",
+            pictures=tuple(int(self.seen[i]) for group, _ in stale for i in group),
+        )
+
+    @property
+    def _alike_rows(self) -> int:
+        """How many rows of the table, with a board in their picture or without, have the pose of the first seen."""
+        rows = self.poses.base_from_hand
+        first = _first_alike(rows)
+        return int((first == first[self.seen[0]]).sum())
+
+    @property
+    def _board_motion(self) -> float:
+        """How far apart in metres the boards of two pictures are that were not taken from one pose."""
+        return MIN_BOARD_MOTION * float(np.median(np.linalg.norm(self.cam_from_board.translation, axis=-1)))
+
+    def _rows_in_words(self, group: Indices) -> str:
+        """Rows by their numbers, and the first and the last with their pictures."""
+        rows = self.seen[group]
+        if (np.diff(rows) == 1).all() and len(rows) > 2:
+            return f"{self.named(int(rows[0]))} to {self.named(int(rows[-1]))}"
+        return " and ".join(self.named(int(row)) for row in rows[:4]) + f" and {len(rows) - 4} more" * (len(rows) > 4)
 
     def _mended(self) -> Iterator[Finding]:
         given, best = self.readings
@@ -262,12 +357,38 @@ class PosedPictures:
             )
 
 
+def _first_alike(poses: RigidTransform) -> Indices:
+    """For each pose the first that is the same, within what robots at rest scatter."""
+    place, turn = poses.translation, np.asarray(poses.as_matrix())
+    near = np.linalg.norm(place[:, None] - place, axis=-1) <= SAME_POSE_MM / 1000
+    return np.asarray((near & (angles(turn) <= np.radians(SAME_POSE_DEG))).argmax(axis=1))
+
+
+def _apart(boards: RigidTransform) -> float:
+    """How far apart boards are at most, in metres, their turns counted at their distance."""
+    place = boards.translation
+    lever = float(np.linalg.norm(place, axis=-1).mean())
+    shifts = np.linalg.norm(place[:, None] - place, axis=-1)
+    return float(np.hypot(shifts, lever * angles(np.asarray(boards.as_matrix()))).max())
+
+
 def turning_finding(turning: Turning, result: HandEye) -> Finding | None:
     """Whether the mount turned too little, and what of X is then not known."""
     unknown, second = result.unknown_directions, float(turning.deg[1])
     name, axis = result.x_name, turning.axes[0]
     direction = ", ".join(f"{x:.2f}" for x in axis)
     mount = "base" if result.eye_to_hand else "hand"
+    if len(unknown) == 3 and turning.deg[0] >= LITTLE_DEG:
+        return Finding(
+            "robot-disagrees",
+            "fault",
+            f"Robot and pictures disagree by {result.turn_noise_deg:.2g}° about each axis, too much for turns of "
+            f"{turning.deg[0]:.2g}° (RMS): the translation of {name} is not known.",
+            result.turn_noise_deg,
+            "°",
+            causes=CAUSES["robot-disagrees"],
+            remedy="See that each picture belongs to the pose of its row, and that board and camera are fixed.",
+        )
     if len(unknown) == 3:
         return Finding(
             "little-turning",
@@ -326,10 +447,16 @@ def _reading(given: Tried, best: Tried) -> Finding:
     id, pairing = best.pairing.id or "wrong-unit", best.pairing
     unit, remedy = UNITS.get(best.unit, ("", ""))
     says = " and ".join(filter(None, [pairing.says, f"the lengths are {unit}" if unit else ""]))
+    sentence = (
+        f"Robot and pictures disagree by {_length(given.error)} (median), and by {_length(best.error)} if {says}."
+    )
+    if not mends.much_better(best.error, given.error):
+        count = len(given.adjusted.displacements)
+        sentence = f"{given.fits} of {count} pictures agree with the robot, and {best.fits} if {says}."
     return Finding(
         id,
         "fault",
-        f"Robot and pictures disagree by {_length(given.error)} (median), and by {_length(best.error)} if {says}.",
+        sentence,
         1000 * given.error,
         "mm",
         causes=CAUSES[id],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +20,10 @@ ALIKE = 1.1  # times the least error: of readings so near to it the one that fit
 FEWEST_TRIED = 6  # poses: fewer can be fitted by a wrong reading
 NEARER = 2.0  # times: by what the angles must agree better for an order or a form to be tried
 RESCALED = 3  # rounds
-SHIFTS = (1, -1, 2, -2, 3, -3)
+MAX_SHIFT_ROWS = 5
+SHIFT_TOLERANCE_DEG = 1.0  # of the angle between two poses: within it robot and pictures agree
+MIN_SHIFT_GAIN = 2  # pictures that must agree beyond those that do without a shift
+MAX_SHIFT_PICTURES = 150  # of more, some evenly
 NEAR_UNIT = 1.1  # times
 UNITS = {
     0.001: ("millimetres", "Read the lengths as millimetres: --unit mm."),
@@ -78,6 +81,11 @@ class Tried:
         return len(far_off(self.adjusted.displacements))
 
     @property
+    def fits(self) -> int:
+        """How many poses agree with the others."""
+        return len(self.adjusted.displacements) - self.strays
+
+    @property
     def as_given(self) -> bool:
         """Whether nothing is read otherwise."""
         return not self.pairing.id and self.unit == 1
@@ -110,6 +118,7 @@ def likely(
     others: Readings,
     to_hand: bool,
     any_scale: bool = False,
+    named: Callable[[int], str] = lambda row: f"pose {row + 1}",
 ) -> tuple[Tried, Tried]:
     """The poses as they were given, and the reading under which robot and pictures agree best.
 
@@ -120,21 +129,32 @@ def likely(
         others: The same rows in other forms, by what asks for them.
         to_hand: The camera stands still.
         any_scale: The board's lengths are not known, so that no unit is tried.
+        named: A row in words.
 
     Returns:
         given: The poses as they were given, in the given unit.
-        best: Under another reading if it takes off two thirds of the error or more, otherwise the same.
+        best: Under another reading if it takes off two thirds of the error or more, or is a shift of rows with which
+            more pictures agree; otherwise the same.
     """
     plain = Pairing("", "", "", rows[seen], cam_from_board)
     given = tried_at_any_scale(plain, to_hand) if any_scale else tried(plain, to_hand, 1.0)
     if len(seen) < FEWEST_TRIED:
         return given, given
     solved = tried_at_any_scale if any_scale else tried
-    readings = [solved(each, to_hand) for each in (plain, *_pairings(rows, seen, cam_from_board, others, to_hand))]
+    pairings = _pairings(rows, seen, cam_from_board, others, to_hand, named)
+    readings = [solved(each, to_hand) for each in (plain, *pairings)]
     least = min(each.error for each in readings)
     alike = [each for each in readings if each.error <= ALIKE * least]
     best = min(alike, key=lambda each: each.strays)  # the first of equals, which is the simplest
-    return given, (best if much_better(best.error, given.error) else given)
+    if much_better(best.error, given.error):
+        return given, best
+    return given, next((each for each in readings if _shift_fits_more(each, given)), given)
+
+
+def _shift_fits_more(shifted: Tried, given: Tried) -> bool:
+    """Whether a shift from some row on brings poses to agree that otherwise stray."""
+    alike = shifted.error <= MUCH_BETTER * given.error
+    return shifted.pairing.id == "poses-shifted" and alike and shifted.fits >= given.fits + MIN_SHIFT_GAIN
 
 
 def much_better(error: float, given: float) -> bool:
@@ -147,12 +167,20 @@ def much_better(error: float, given: float) -> bool:
 
 
 def _pairings(
-    rows: RigidTransform, seen: Indices, boards: RigidTransform, others: Readings, to_hand: bool
+    rows: RigidTransform,
+    seen: Indices,
+    boards: RigidTransform,
+    others: Readings,
+    to_hand: bool,
+    named: Callable[[int], str],
 ) -> Iterator[Pairing]:
     """The readings that the angles of the motions do not rule out."""
     yield inverted(Pairing("", "", "", rows[seen], boards), to_hand)
+    for other in _shifted(rows, seen, boards, named):
+        yield other
+        yield inverted(other, to_hand)
     given = Motions(rows[seen], boards).angle_mismatch
-    ordered = (*_shifted(rows, seen, boards), *_reordered(rows, seen, boards))
+    ordered = _reordered(rows, seen, boards)
     for other, bound in (*((each, given / NEARER) for each in ordered), *_misread_bounded(others, seen, boards, given)):
         if Motions(other.base_from_hand, other.cam_from_board).angle_mismatch < bound:
             yield other
@@ -183,19 +211,102 @@ def inverted(pairing: Pairing, to_hand: bool) -> Pairing:
     return replace(pairing, id=id, says=says, remedy=remedy, base_from_hand=poses)
 
 
-def _shifted(rows: RigidTransform, seen: Indices, boards: RigidTransform) -> Iterator[Pairing]:
-    for shift in SHIFTS:
-        kept = (seen + shift >= 0) & (seen + shift < len(rows))
-        if kept.sum() >= FEWEST_TRIED:
-            by = f"{abs(shift)} row{'s' * (abs(shift) > 1)}"
-            yield Pairing(
-                "poses-shifted",
-                f"each picture belongs to the pose {by} {'further down' if shift > 0 else 'further up'}",
-                f"Pair each picture with the pose {by} {'after' if shift > 0 else 'before'} its own, and look for the "
-                "picture or the row that is missing.",
-                rows[(seen + shift)[kept]],
-                boards[kept],
-            )
+def _shifted(
+    rows: RigidTransform, seen: Indices, boards: RigidTransform, named: Callable[[int], str]
+) -> Iterator[Pairing]:
+    shifts = row_shifts(rows, seen, boards)
+    if shifts is None:
+        return
+    kept = (seen + shifts >= 0) & (seen + shifts < len(rows))
+    if kept.sum() < FEWEST_TRIED:
+        return
+    says, remedy = shift_words(shifts, seen, named)
+    yield Pairing("poses-shifted", says, remedy, rows[(seen + shifts)[kept]], boards[kept])
+
+
+def row_shifts(rows: RigidTransform, places: Indices, boards: RigidTransform) -> Indices | None:
+    """By how many rows the pose of each picture lies beyond its place, where that makes more pictures agree.
+
+    The angle between two poses of the hand is that between the boards of their pictures (`Motions.angle_mismatch`).
+    First those shifts are sought with which most pictures agree with one of them, tried for each as that one. Then
+    those are sought with which most pictures agree with more than half of these.
+
+    Args:
+        rows: The robot's poses.
+        places: (pictures,), the row of each picture as given; it may lie beyond the last one.
+        boards: The board in each picture.
+
+    Returns: (pictures,), or None where not at least two pictures more agree than without shifts.
+    """
+    if len(places) > MAX_SHIFT_PICTURES:
+        stride = -(-len(places) // MAX_SHIFT_PICTURES)
+        some = row_shifts(rows, places[::stride], boards[::stride])
+        return None if some is None else np.repeat(some, stride)[: len(places)]
+    robot, camera = (angles(np.asarray(each.as_matrix())) for each in (rows, boards))
+    steps = np.arange(-MAX_SHIFT_ROWS, MAX_SHIFT_ROWS + 1)
+    at = places[:, None] + steps
+    inside = (at >= 0) & (at < len(rows))
+    at = np.clip(at, 0, len(rows) - 1)
+    off = np.abs(robot[at[:, :, None, None], at] - camera[:, None, :, None])
+    # agree[i, a, j, b]: picture i shifted by a with picture j shifted by b
+    agree = (off < np.radians(SHIFT_TOLERANCE_DEG)) & inside[:, :, None, None] & inside
+    none = np.full(len(places), MAX_SHIFT_ROWS)
+    shifted = _steadiest(_supported(agree, _steadiest(agree)))
+    supported = _supported(agree, shifted)
+    gain = _count(supported, shifted) - _count(supported, none)
+    return np.asarray(steps[shifted]) if gain >= MIN_SHIFT_GAIN else None
+
+
+def _count(supported: Array, path: Indices) -> int:
+    return int(supported[np.arange(len(path)), path].sum())
+
+
+def _supported(agree: Array, path: Indices) -> Array:
+    """Whether pictures under shifts (pictures, shifts) agree with more than half of those that agree on this path."""
+    own = np.arange(len(path))
+    mutual = agree[own[:, None], path[:, None], own, path]
+    members = mutual[mutual.sum(axis=1).argmax()]
+    others = members[:, None] & (own[:, None] != own)
+    return 2 * (others[..., None] & agree[own, path]).sum(axis=0) > others.sum(axis=0)[:, None]
+
+
+def _steadiest(agree: Array) -> Indices:
+    """The path (pictures,) of shifts of most agreements (..., pictures, shifts), less one for each change.
+
+    By dynamic programming (A. Viterbi, IEEE Transactions on Information Theory 13, 1967). Of several problems the path
+    of the best is returned.
+    """
+    steps = np.arange(agree.shape[-1])
+    total, before = agree[..., 0, :].astype(float), []
+    for j in range(1, agree.shape[-2]):
+        best = total.argmax(axis=-1)[..., None]
+        worth = np.take_along_axis(total, best, axis=-1) - 1
+        before.append(np.where(total >= worth, steps, best))
+        total = np.maximum(total, worth) + agree[..., j, :]
+    *which, last = np.unravel_index(total.argmax(), total.shape)
+    path = [int(last)]
+    for step in reversed(before):
+        path.append(int(step[(*which, path[-1])]))
+    return np.array(path[::-1])
+
+
+def shift_words(shifts: Indices, places: Indices, named: Callable[[int], str]) -> tuple[str, str]:
+    """What is the case with shifts (pictures,) of rows, as the rest of a sentence; and what to do."""
+    starts = [0, *(np.flatnonzero(np.diff(shifts)) + 1)]
+    parts = []
+    for begin in starts:
+        by = abs(int(shifts[begin]))
+        way = "down" if shifts[begin] > 0 else "up"
+        pose = f"the pose {by} row{'s' * (by > 1)} further {way}" if by else "the pose of its own row"
+        if begin:
+            parts.append(f"from {named(int(places[begin]))} on each picture belongs to {pose}")
+        elif by:
+            parts.append(f"each picture belongs to {pose}")
+    changes = np.diff(shifts, prepend=0)[starts]
+    place = int(np.flatnonzero(changes)[0])
+    where = f"before {named(int(places[starts[place]]))}" if starts[place] else "at the start"
+    what = "missing picture or surplus row" if changes[place] > 0 else "missing row or surplus picture"
+    return ", and ".join(parts), f"Look for a {what} {where}, and pair pictures and poses anew."
 
 
 def _reordered(rows: RigidTransform, seen: Indices, boards: RigidTransform) -> Iterator[Pairing]:

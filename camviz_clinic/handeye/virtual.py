@@ -202,9 +202,29 @@ def _reordered(rng: Rng) -> PosedPictures:
     return _case(well.told(well.base_from_hand[orders[rng.integers(4)]]))
 
 
+def _repeated(rng: Rng) -> PosedPictures:
+    """From some row on, or in blocks of two or three, one pose is written again and again."""
+    well = _stopping(rng)
+    rows = np.arange(len(well.base_from_hand))
+    block = int(rng.integers(2, 4))
+    stale = rows - rows % block if rng.integers(2) else np.minimum(rows, rng.integers(0, 7))
+    return _case(well.told(well.base_from_hand[stale]))
+
+
+def lost_pictures(well: Cell, first: int, count: int, *, rows: bool = False) -> Cell:
+    """A cell that lacks some pictures, or rows, from `first` on, so that all after them belong to other rows."""
+    kept = np.delete(np.arange(len(well.base_from_hand)), np.arange(first, first + count))
+    ends = slice(None, len(kept))
+    if rows:
+        return replace(well, base_from_hand=well.base_from_hand[kept], pixels=well.pixels[ends])
+    return replace(well, base_from_hand=well.base_from_hand[ends], pixels=well.pixels[kept])
+
+
 def _shifted(rng: Rng) -> PosedPictures:
-    """The first one to three poses, or pictures, are missing."""
+    """One to three poses, or pictures, are missing: the first, or some later."""
     well, shift = _stopping(rng), int(rng.integers(1, 4))
+    if rng.integers(2):
+        return _case(lost_pictures(well, int(rng.integers(2, 7)), shift, rows=bool(rng.integers(2))))
     if rng.integers(2):
         return _case(replace(well, base_from_hand=well.base_from_hand[shift:], pixels=well.pixels[:-shift]))
     return _case(replace(well, base_from_hand=well.base_from_hand[:-shift], pixels=well.pixels[shift:]))
@@ -253,6 +273,7 @@ def _squares(rng: Rng) -> PosedPictures:
 
 FAULTS: Mapping[str, Callable[[Rng], PosedPictures]] = {
     "wrong-unit": lambda rng: _case(scaled(_stopping(rng), float(rng.choice([0.001, 1000])))),
+    "poses-repeated": _repeated,
     "poses-inverted": _inverted,
     "poses-shifted": _shifted,
     "poses-reordered": _reordered,

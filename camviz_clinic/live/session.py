@@ -201,7 +201,7 @@ class Session:
             path: Where to.
             format: One of `camviz_clinic.files.formats()`.
 
-        Returns: In sentences what the format cannot hold.
+        Returns: What the format cannot hold, as noun phrases such as "the board".
         """
         return write(self.calibration, path, format)
 

@@ -78,7 +78,7 @@ class CaptureWidget(StillWidget):
             path: Where to.
             format: One of `camviz_clinic.files.formats()`.
 
-        Returns: In sentences what the format cannot hold.
+        Returns: What the format cannot hold, as noun phrases such as "the board".
         """
         return self.session.save(path, format)
 

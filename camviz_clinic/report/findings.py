@@ -28,7 +28,7 @@ def said_html(inspection: Inspection) -> str:
     said += f"<strong>{escape(inspection.verdict)}</strong>"
     said += f"<br>{escape(words.claim(inspection.findings))}" if worst else ""
     said += f"<br><b>Next:</b> {escape(inspection.next_step)}" if inspection.next_step else ""
-    compared = "".join(f"<p>{escape(each.sentence)}</p>" for each in inspection.differences)
+    compared = "".join(f"<p>{escape(each)}</p>" for each in inspection.compared)
     return f"{compared}{said}</p>"
 
 

@@ -60,8 +60,9 @@ class FoldView(View):
     def sentences(self) -> list[str]:
         """What the numbers mean, in words."""
         n = self.numbers()
+        ends = "has a pole" if isfinite(n["pole_radius"]) and not isfinite(n["fold_deg"]) else "folds"
         told = [
-            f"{100 * n['without_ray']:.2g} % of the picture's pixels have no ray: the polynomial folds before it "
+            f"{100 * n['without_ray']:.2g} % of the picture's pixels have no ray: the polynomial {ends} before it "
             "reaches them."
             if n["without_ray"] > 0
             else "Every pixel of the picture has a ray: nothing folds inside it."

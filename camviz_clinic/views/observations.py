@@ -121,7 +121,7 @@ class Observations:
 
     @cached_property
     def residuals(self) -> Array:
-        """Observed less projected, (views, corners, 2) in pixels."""
+        """Detected less projected, (views, corners, 2) in pixels."""
         return self.detections - self.projected
 
     @cached_property

@@ -63,7 +63,7 @@ class OutliersView(ObservedView):
             attached |= crops
         seen = self.observations
         words = (
-            f"Green: detected; orange arrow: to the projection; red cross: set aside ({seen.aside.sum()} of "
+            f"Green: detected; orange arrow: from the projection to it; red cross: set aside ({seen.aside.sum()} of "
             f"{(seen.used | seen.aside).sum()} corners)."
         )
         if not attached:
@@ -81,12 +81,12 @@ class OutliersView(ObservedView):
         if image is not None:
             crops = {f"corner{i}": jpeg(crop(image, seen.camera.intrinsics, middle, self.patch))}
             content = svg.image(f"corner{i}", 0, 0, 138, 138)
-        start, end = panel.place(seen.detections[view, corner]), panel.place(seen.projected[view, corner])
+        start, end = panel.place(seen.projected[view, corner]), panel.place(seen.detections[view, corner])
         content += arrows([start], [end], "orange thick", 8)
         content += (
-            cross([start], "red")
+            cross([end], "red")
             if seen.aside[view, corner]
-            else svg.dots([start], "paper-dot", 7) + svg.dots([start], "green", 5)
+            else svg.dots([end], "paper-dot", 7) + svg.dots([end], "green", 5)
         )
         row, column = divmod(corner, seen.board.columns)
         below = svg.text((x, y + 156), f"{seen.lengths[view, corner]:.2f} px", "note")

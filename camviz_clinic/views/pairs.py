@@ -85,10 +85,10 @@ class SharedViews:
 
     @cached_property
     def offsets(self) -> tuple[Array, Array]:
-        """From each corner straight to its epipolar line, (views, corners, 2) ideal pixels, in either picture."""
+        """From the nearest point of its epipolar line to each corner, (views, corners, 2) ideal pixels, by picture."""
         F = twoview.fundamental(*self.ideal)
         left, right = self.straightened
-        return _to_line(twoview.epipolar_lines(F.T, right), left), _to_line(twoview.epipolar_lines(F, left), right)
+        return _from_line(twoview.epipolar_lines(F.T, right), left), _from_line(twoview.epipolar_lines(F, left), right)
 
     @cached_property
     def distances(self) -> tuple[Array, Array]:
@@ -115,7 +115,7 @@ class SharedViews:
 class EpipolarPairsView(ViewChooser):
     """Every shared view's distance from its epipolar lines, and the chosen view's two pictures with some of the lines.
 
-    Arrows lead from each corner towards its line, `scale` times as long. The arrow along the first row tells in which
+    Arrows lead from its line towards each corner, `scale` times as long. The arrow along the first row tells in which
     order the corners were found: it must start at the same corner of the board in both.
     """
 
@@ -189,8 +189,8 @@ class EpipolarPairsView(ViewChooser):
             content, attached = placed_image(panel, name, k.width, k.height), {name: jpeg(image)}
         content += self._lines(panel, side)
         corners, offsets = shared.detections[side][i], shared.offsets[side][i]
-        starts = panel.place(corners)
-        content += arrows(starts, panel.place(corners + self.scale * offsets), "orange")
+        starts, on_line = panel.place(corners), corners - offsets
+        content += arrows(panel.place(on_line), panel.place(on_line + self.scale * offsets), "orange")
         content += svg.dots(starts, "paper-dot", 6) + svg.dots(starts, "red", 4)
         row = starts[: shared.columns][np.isfinite(starts[: shared.columns, 0])]
         if len(row) > 1:
@@ -224,7 +224,7 @@ def pair_of(calibration: Calibration) -> tuple[Camera, Camera]:
     return cameras[0], cameras[1]
 
 
-def _to_line(lines: Array, uv: Array) -> Array:
-    """From points (..., 2) straight to normalised lines (..., 3)."""
+def _from_line(lines: Array, uv: Array) -> Array:
+    """From the nearest point of normalised lines (..., 3) to points (..., 2)."""
     signed = np.sum(lines * twoview.to_homogeneous(uv), axis=-1, keepdims=True)
-    return -signed * lines[..., :2]
+    return signed * lines[..., :2]

@@ -46,8 +46,8 @@ _LAYOUT = rows(
 class ResidualsView(ViewChooser, OrbitView):
     """Every view's error, and where the chosen view has it: in its picture, in space, and in the board's frame.
 
-    An arrow leads from a corner as detected towards where the calibration projects it, `scale` times as long as in the
-    picture. Corners that were set aside have red crosses. Click a bar, or drag along them, to choose a view.
+    An arrow leads from where the calibration projects a corner towards where it was detected, `scale` times as long as
+    in the picture. Corners that were set aside have red crosses. Click a bar, or drag along them, to choose a view.
     """
 
     title: ClassVar[str] = "Residuals, view by view"
@@ -172,18 +172,20 @@ class ResidualsView(ViewChooser, OrbitView):
         if image is not None:
             content, missing = placed_image(panel, "photograph", k.width, k.height), svg.NOTHING
             attached = {"photograph": jpeg(image)}
-        starts, ends = panel.place(seen.detections[i]), panel.place(self.arrow_tips())
-        content += arrows(starts[seen.used[i]], ends[seen.used[i]], "orange")
-        content += svg.dots(starts[seen.used[i]], "paper-dot", 6) + svg.dots(starts[seen.used[i]], "green", 4)
+        detected, starts = panel.place(seen.detections[i]), panel.place(seen.projected[i])
+        ends, used = panel.place(self.arrow_tips()), seen.used[i]
+        content += arrows(starts[used], ends[used], "orange")
+        content += svg.dots(detected[used], "paper-dot", 6) + svg.dots(detected[used], "green", 4)
         aside, cut = _set_aside(starts[seen.aside[i]], ends[seen.aside[i]])
+        aside += cross(detected[seen.aside[i]], "red")
         title = f"{seen.picture(i)}: residuals × {self.scale:g}"
-        note = "red: longer than drawn" if cut else "from detected to projected"
+        note = "red: longer than drawn" if cut else "from projected to detected"
         return panel.show(content + aside + missing, title=title, note=note), attached
 
     def arrow_tips(self) -> Array:
-        """Where (corners, 2) the chosen view's arrows end, in pixels: `scale` times the way to the projection."""
+        """Where (corners, 2) the chosen view's arrows end, in pixels: `scale` residuals from the projection."""
         seen, i = self.observations, self.index
-        return seen.detections[i] - self.scale * seen.residuals[i]
+        return seen.projected[i] + self.scale * seen.residuals[i]
 
     def _grid(self, panel: Panel) -> Marks:
         """The board's lines as projected, for want of a photograph."""
@@ -202,13 +204,13 @@ class ResidualsView(ViewChooser, OrbitView):
         panel = replace(place, left=left, top=top, right=left + place.width / scale, bottom=top + place.height / scale)
         corners = seen.corners_board[:, :2]
         grid = panel.place(corners).reshape(board.rows, board.columns, 2)
-        tips = corners + self.board_scale * (corners - seen.on_board[i])
+        tips = corners + self.board_scale * (seen.on_board[i] - corners)
         content = svg.path([*grid, *grid.swapaxes(0, 1)], "grid")
         starts, ends = panel.place(corners), panel.place(tips)
         content += arrows(starts[seen.used[i]], ends[seen.used[i]], "orange") + svg.dots(
             starts[seen.used[i]], "green", 4
         )
-        content += _set_aside(starts[seen.aside[i]], ends[seen.aside[i]], 4)[0]
+        content += _set_aside(starts[seen.aside[i]], ends[seen.aside[i]])[0] + cross(starts[seen.aside[i]], "red", 4)
         off = np.linalg.norm(seen.on_board[i] - corners, axis=-1)[seen.used[i]]
         note = f"typically {1000 * np.median(off):.2g} mm on the board" if off.size else ""
         return panel.show(content, title=f"The same on the board, × {self.board_scale:.3g}", note=note)
@@ -237,10 +239,10 @@ class ResidualsView(ViewChooser, OrbitView):
         )
 
 
-def _set_aside(starts: Array, ends: Array, size: float = 5) -> tuple[Marks, bool]:
-    """Crosses and arrows (n, 2) of corners that were set aside, whose errors know no bounds, and whether any is cut."""
+def _set_aside(starts: Array, ends: Array) -> tuple[Marks, bool]:
+    """Arrows between places (n, 2) for corners that were set aside, and whether any is shortened."""
     ends, cut = shortened(starts, ends, _LONGEST)
-    return arrows(starts, ends, "red dotted") + cross(starts, "red", size), bool(cut.any())
+    return arrows(starts, ends, "red dotted"), bool(cut.any())
 
 
 def bars_panel(seen: Observations, x: float = 70, y: float = 34, width: float = 870, height: float = 140) -> Panel:

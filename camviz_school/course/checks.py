@@ -8,6 +8,7 @@ to someone who has not tried: an untouched stub brings neither a hint nor, where
 from __future__ import annotations
 
 import io
+import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from math import log10
@@ -30,6 +31,7 @@ from camviz_school.course.trials import (
     same_outcome,
     signature_complaint,
     stopped,
+    whole_numbers,
 )
 from camviz_school.course.verdict import Verdict
 
@@ -47,6 +49,9 @@ NEAR = 1e-4
 
 ROUGHLY = 0.03
 """Of |answer|: as near as the best of a few hundred tries."""
+
+MIN_RECURSION_LIMIT = 1000
+"""Calls within calls: Python's own limit, for the time of a check where someone has set a lower one."""
 
 
 def judge(exercise: Exercise, function: Any, rng: np.random.Generator | None = None, attempt: int = 1) -> Verdict:
@@ -71,11 +76,15 @@ def judge(exercise: Exercise, function: Any, rng: np.random.Generator | None = N
     'What is x by x?'
     """
     rng = np.random.default_rng() if rng is None else rng
+    limit = sys.getrecursionlimit()
+    sys.setrecursionlimit(max(limit, MIN_RECURSION_LIMIT))
     try:
         with Patience() as patience:
             return _judged(exercise, function, rng, attempt, patience)
     except KeyboardInterrupt as stop:  # between two calls of the function
         return Verdict(exercise.name, "wrong", stopped("the check", stop))
+    finally:
+        sys.setrecursionlimit(limit)
 
 
 def _judged(exercise: Exercise, function: Any, rng: np.random.Generator, attempt: int, patience: Patience) -> Verdict:
@@ -152,23 +161,46 @@ def _complaint(
     """What is wrong, in words, the most telling thing first; empty when nothing is."""
     if all(trial.fits for trial in trials):
         mutated = next((trial.mutated for trial in trials if trial.mutated), "")
-        return mutated or _broken_law(exercise, function, rng, patience)
+        return (
+            mutated
+            or _with_whole_numbers(exercise, function, trials, patience)
+            or _broken_law(exercise, function, rng, patience)
+        )
     wrong = [trial for trial in trials if not trial.fits]
     known = _known(exercise, exercise.misconceptions, trials) or _nothing_but_nan(trials) or _constant(trials)
     broken = next((trial.complaint for trial in wrong if trial.complaint), "")
     if broken:
-        return known or _only_for_some(exercise, trials) + broken
+        return known or _only_for_some(exercise, function, trials, patience) + broken
     return (
         known
         or _usual_change(exercise, trials)
         or _factor(exercise, trials)
         or _misplaced_nan(exercise, wrong)
-        or _in_some_shapes(exercise, trials, wrong[0])
+        or _in_some_shapes(exercise, function, trials, patience)
         or _in_steps(exercise, function, trials, patience)
         or _nearly(exercise, trials)
         or _without_a_look_at(exercise, function, patience)
         or _difference(exercise, wrong[0])
     )
+
+
+def _with_whole_numbers(exercise: Exercise, function: Function, trials: Sequence[Trial], patience: Patience) -> str:
+    """Speaks when whole numbers bring a wrong answer, above all as integers; an error in answer to these is forgiven.
+
+    OpenCV's functions raise one, and whoever calls them learns what to do.
+    """
+    for whole in whole_numbers(exercise, [trial.arguments for trial in trials]):
+        trial = run(exercise, function, whole.decimals, patience)
+        if not trial.fits:
+            return trial.complaint or _difference(exercise, trial)
+        trial = run(exercise, function, whole.integers, patience)
+        if not (trial.fits or trial.raised):
+            return (
+                f"{trial.complaint or _difference(exercise, trial)} For the same numbers as decimals it is right. "
+                "For example, `np.zeros_like` of integers makes integers, which cut decimals off: "
+                "give the array that you fill `dtype=float`."
+            )
+    return ""
 
 
 def _broken_law(exercise: Exercise, function: Function, rng: np.random.Generator, patience: Patience) -> str:
@@ -206,9 +238,7 @@ def _nothing_but_nan(trials: Sequence[Trial]) -> str:
     answers = [trial.actual for trial in trials if trial.actual]
     if not answers or not np.isnan(_joined(answers)).all():
         return ""
-    return (
-        "Every number that your function answers is NaN: somewhere it divides 0 by 0, or takes a root of less than 0."
-    )
+    return "All values that your function returns are NaN. Print the values on the way to find the first NaN."
 
 
 def _constant(trials: Sequence[Trial]) -> str:
@@ -262,11 +292,16 @@ def _factor(exercise: Exercise, trials: Sequence[Trial]) -> str:
 
 
 def _misplaced_nan(exercise: Exercise, wrong: Sequence[Trial]) -> str:
+    """Speaks when nothing but the place of NaN is wrong."""
+    actual, expected = _joined(t.actual for t in wrong), _joined(t.expected for t in wrong)
+    either = np.isnan(actual) | np.isnan(expected)
+    if not exercise.close(actual, expected)[~either].all():
+        return ""
     for trial in wrong:
-        actual, expected = np.isnan(_joined([trial.actual])), np.isnan(_joined([trial.expected]))
-        if (expected & ~actual).any():
+        no_answer, no_number = np.isnan(_joined([trial.expected])), np.isnan(_joined([trial.actual]))
+        if (no_answer & ~no_number).any():
             return f"Some of these inputs have no answer, and then NaN is wanted: {exercise.call(trial.arguments)}."
-        if (actual & ~expected).any():
+        if (no_number & ~no_answer).any():
             return f"Your function gives NaN where there is an answer: {exercise.call(trial.arguments)}."
     return ""
 
@@ -321,26 +356,54 @@ def _without_a_look_at(exercise: Exercise, function: Function, patience: Patienc
     return ""
 
 
-def _only_for_some(exercise: Exercise, trials: Sequence[Trial]) -> str:
-    """Names the shapes for which the function is right, when the shape of the first input decides it."""
-    shapes = [np.shape(trial.arguments[0]) if trial.arguments else () for trial in trials]
-    right = {shape for shape, trial in zip(shapes, trials, strict=True) if trial.fits}
-    wrong = {shape for shape, trial in zip(shapes, trials, strict=True) if not trial.fits}
-    if not right or right & wrong:
-        return ""
-    return f"It is right when `{exercise.parameters[0]}` has shape {_listed(right)}, but not for {_listed(wrong)}. "
+def _only_for_some(exercise: Exercise, function: Function, trials: Sequence[Trial], patience: Patience) -> str:
+    """Names the shapes of an argument for which the function is right, when the shape alone decides it.
+
+    Each shape is tried a second time, with the numbers of a case that turned out the other way.
+    """
+    for index, name in enumerate(exercise.parameters):
+        right = {np.shape(trial.arguments[index]): trial.arguments for trial in trials if trial.fits}
+        wrong = {np.shape(trial.arguments[index]): trial.arguments for trial in trials if not trial.fits}
+        if not right or not wrong or set(right) & set(wrong):
+            continue
+        one_right, one_wrong = next(iter(right.values())), next(iter(wrong.values()))
+        again = [(_in_shape(index, like, one_wrong), True) for like in right.values()]
+        again += [(_in_shape(index, like, one_right), False) for like in wrong.values()]
+        if all(_turns_out(exercise, function, arguments, fits, patience) for arguments, fits in again):
+            return f"It is right when `{name}` has shape {_listed(right)}, but not for {_listed(wrong)}. "
+    return ""
 
 
-def _in_some_shapes(exercise: Exercise, trials: Sequence[Trial], wrong: Trial) -> str:
-    shapes = _only_for_some(exercise, trials)
-    return shapes and shapes + _difference(exercise, wrong)
+def _in_shape(index: int, like: Arguments, arguments: Arguments) -> Arguments:
+    """The arguments, the one at the index (and all that share its shape in both cases) repeated or cut off to fit."""
+    before, after = np.shape(arguments[index]), np.shape(like[index])
+    return tuple(
+        np.resize(value, after) if (np.shape(value), np.shape(model)) == (before, after) else value
+        for value, model in zip(arguments, like, strict=True)
+    )
+
+
+def _turns_out(exercise: Exercise, function: Function, arguments: Arguments, fits: bool, patience: Patience) -> bool:
+    """Whether the function is right, or wrong, for arguments of which the reference may not know what to make."""
+    try:
+        exercise.answer(arguments)
+    except (ValueError, IndexError, np.linalg.LinAlgError):
+        return False
+    return run(exercise, function, arguments, patience).fits == fits
+
+
+def _in_some_shapes(exercise: Exercise, function: Function, trials: Sequence[Trial], patience: Patience) -> str:
+    shapes = _only_for_some(exercise, function, trials, patience)
+    return shapes and shapes + _difference(exercise, next(trial for trial in trials if not trial.fits))
 
 
 def _difference(exercise: Exercise, trial: Trial) -> str:
     actual, expected = next(
         pair for pair in zip(trial.actual, trial.expected, strict=True) if not exercise.close(*pair).all()
     )
-    index = tuple(int(i) for i in np.argwhere(~exercise.close(actual, expected))[0])
+    wrong = ~exercise.close(actual, expected)
+    numbers = wrong & ~np.isnan(actual) & ~np.isnan(expected)  # two of them say more than one and NaN
+    index = tuple(int(i) for i in np.argwhere(numbers if numbers.any() else wrong)[0])
     where = f" at index {list(index)}" if index else ""
     got, right = _told_apart(float(actual[index]), float(expected[index]), exercise.yes_or_no)
     return f"{exercise.call(trial.arguments)} gave {got}{where}, where {right} is right."

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import inspect
 import io
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from camviz.views.calls import Array, Function, as_arrays, contained, explain, message, quiet, stopped
+from camviz.views.calls import Array, Function, as_arrays, contained, explain, is_stub_error, message, quiet, stopped
 from camviz.views.patience import Patience, TimeIsUp
 
 Arguments = tuple[Any, ...]
@@ -60,6 +60,7 @@ class Exercise:
         canonical: Brings answers that mean the same (a matrix up to scale) to one form before they are compared.
         laws: Further statements, law(function, rng) -> complaint in words, or "" where it holds.
         as_given: The faulty function with which the search for a bug begins.
+        any_numbers: False where rounded arguments no longer belong together, such as the pixels of one point.
 
     Raises: ValueError for other than three hints, and a tolerance that is not positive.
 
@@ -82,6 +83,7 @@ class Exercise:
     canonical: Callable[[Array], Array] | None = None
     laws: tuple[Callable[[Function, np.random.Generator], str], ...] = ()
     as_given: Function | None = None
+    any_numbers: bool = True
     misconceptions: list[Misconception] = field(default_factory=list, init=False)
     right_ways: list[Function] = field(default_factory=list, init=False)
     conventions: list[Misconception] = field(default_factory=list, init=False)
@@ -210,6 +212,59 @@ class Exercise:
 
 
 @dataclass(frozen=True)
+class Whole:
+    """The arguments of one call, some of them whole numbers: as decimals, and as integers."""
+
+    decimals: Arguments
+    integers: Arguments
+
+
+def whole_numbers(exercise: Exercise, cases: Iterable[Arguments]) -> Iterator[Whole]:
+    """The first case that can be rounded and has another answer than whole numbers, if there is one.
+
+    An array is rounded where that leaves NaN and infinity in the answer where they were. Matrices (3, 3) and (4, 4)
+    stay: few of them are rotations, or have an inverse, once they are rounded.
+
+    Args:
+        exercise: What was asked.
+        cases: Of the exercise.
+
+    Returns: Iterator over no case or one.
+    """
+    if not exercise.any_numbers or exercise.yes_or_no:
+        return
+    for case in cases:
+        decimals = _rounded(exercise, case)
+        rounded = [one is not other for one, other in zip(decimals, case, strict=True)]
+        answer = exercise.answer(decimals)
+        if any(rounded) and not exercise.same(answer, tuple(map(np.rint, answer))):
+            pairs = zip(decimals, rounded, strict=True)
+            yield Whole(decimals, tuple(value.astype(np.int64) if whole else value for value, whole in pairs))
+            return
+
+
+def _rounded(exercise: Exercise, case: Arguments) -> Arguments:
+    """A case, its arrays rounded one after the other, as far as the answer bears it."""
+    finite = _finite(exercise, case)
+    for index, value in enumerate(case):
+        array = isinstance(value, np.ndarray) and value.dtype.kind == "f" and value.ndim > 0
+        if not array or value.shape[-2:] in ((3, 3), (4, 4)) or not np.isfinite(value).all():
+            continue
+        tried = (*case[:index], np.rint(value), *case[index + 1 :])
+        if _finite(exercise, tried) == finite:
+            case = tried
+    return case
+
+
+def _finite(exercise: Exercise, case: Arguments) -> list[list[bool]]:
+    """Which numbers of the answer are finite; empty where there is no answer."""
+    try:
+        return [np.isfinite(part).ravel().tolist() for part in exercise.answer(case)]
+    except np.linalg.LinAlgError:
+        return []
+
+
+@dataclass(frozen=True)
 class Trial:
     """What came of one call.
 
@@ -257,11 +312,11 @@ def _called(
     try:
         with contained(output):
             result = patience.call(function, *given)
-    except NotImplementedError:
-        return _nothing(exercise, trial), None
     except (KeyboardInterrupt, TimeIsUp) as stop:
         return _interrupted(exercise, trial, stop), None
     except BaseException as error:
+        if is_stub_error(error, function):
+            return _nothing(exercise, trial), None
         complaint = explain(error, function) + f" It was called as {exercise.call(trial.arguments)}."
         return replace(trial, raised=(type(error), message(error)), complaint=complaint), None
     return (_nothing(exercise, trial) if result is None or result is Ellipsis else trial), result
@@ -336,8 +391,8 @@ def _nothing(exercise: Exercise, trial: Trial) -> Trial:
 
 
 def _compared(exercise: Exercise, trial: Trial, result: Any, patience: Patience) -> Trial:
-    if isinstance(result, list) and len(trial.expected) > 1:
-        result = tuple(result)  # two answers in a list are two answers
+    if len(trial.expected) > 1 and (isinstance(result, list) or _is_stack(result, trial.expected)):
+        result = tuple(result)  # two answers in a list or in one array are two answers
     try:
         with contained(_Printed()):  # the result's own methods are a reader's, too
             shapes, actual = patience.call(lambda: ([p.shape for p in as_arrays(result)], exercise.normalised(result)))
@@ -349,6 +404,11 @@ def _compared(exercise: Exercise, trial: Trial, result: Any, patience: Patience)
     complaint = _shape_complaint(exercise, trial, shapes)
     fits = not complaint and exercise.same(actual, trial.expected)
     return replace(trial, actual=actual, complaint=complaint, fits=fits)
+
+
+def _is_stack(result: Any, expected: tuple[Array, ...]) -> bool:
+    """Whether one array has all answers, one after the other along its first axis."""
+    return isinstance(result, np.ndarray) and all(result.shape == (len(expected), *part.shape) for part in expected)
 
 
 def _shape_complaint(exercise: Exercise, trial: Trial, shapes: list[tuple[int, ...]]) -> str:

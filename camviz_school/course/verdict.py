@@ -55,4 +55,5 @@ class Verdict:
     def _parts(self) -> list[str]:
         hint = [f"*Hint.* {self.hint}"] if self.hint else []
         printed = [f"(Your function printed: ``{self.printed}``)"] if self.printed else []
-        return [f"{_TITLES[self.status]} {self.message}", *hint, *printed]
+        parts = [f"{_TITLES[self.status]} {self.message}", *hint, *printed]
+        return [part.encode(errors="backslashreplace").decode() for part in parts]  # half of a surrogate pair

@@ -261,6 +261,16 @@ def _changed_comparison(node: ast.Compare) -> Iterator[ast.expr]:
         for other in _OPERATORS.get(type(operator), ()):
             yield ast.Compare(node.left, [*node.ops[:i], other(), *node.ops[i + 1 :]], node.comparators)
     yield from (ast.Constant(True), ast.Constant(False))
+    yield from _moved_boundaries(node)
+
+
+def _moved_boundaries(node: ast.Compare) -> Iterator[ast.expr]:
+    """The comparison with a limit that lies a hundredth higher or lower."""
+    for i, limit in enumerate(node.comparators):
+        if isinstance(node.ops[i], ast.Lt | ast.LtE | ast.Gt | ast.GtE) and not isinstance(limit, ast.Constant):
+            for factor in (0.99, 1.01):
+                moved = ast.BinOp(ast.Constant(factor), ast.Mult(), limit)
+                yield ast.Compare(node.left, node.ops, [*node.comparators[:i], moved, *node.comparators[i + 1 :]])
 
 
 def _changed_constant(node: ast.Constant, around: Around) -> Iterator[ast.expr]:

@@ -705,7 +705,7 @@ def test_two_crossed_plates_make_two_spots_and_a_quarter_wave_plate_between_them
 
 
 def test_blurring_afterwards_does_nothing(says):
-    f, wide = says("After that, stripes of 0.48 cycles per pixel have become bands 50 pixels wide")
+    wide, f = says("has made bands 50 pixels wide of stripes of 0.48 cycles per pixel")
     says("The same blur takes nearly all of the colour away before the sampling, and nothing after it.")
     assert wide == 1 / beat(f.value)
     plain = bilinear(sampled(stripes(f.value, 64), RGGB), RGGB)
@@ -954,3 +954,27 @@ def test_the_quiz_about_the_green_numbers(says):
     assert others == of.value * np.mean(RGGB != 0) == of.value * np.mean(RGGB != 2)
     (all_alike,) = says("32 million: two thirds.")
     assert all_alike == of.value * 2 / 3
+
+
+def test_algorithms_differ_on_upright_stripes_but_not_on_a_chessboard(says):
+    """Beside colour_demosaicing's bilinear and Menon: 1.59 and 0, and equal mosaics of grey and magenta."""
+    f, by_bilinear = says(
+        "For vertical stripes of 0.48 cycles per pixel, red − blue swings by 1.59 with bilinear interpolation, and by "
+        "0 with the edge-aware and Menon's algorithm."
+    )
+    says("from a chessboard of single pixels none can")
+    rggb = mosaics.BAYER["RGGB"]
+    one_row = 0.5 + 0.4 * np.cos(2 * np.pi * f.value * np.arange(400))
+    measured = np.tile(one_row, (64, 1))  # grey, so that every filter sees the same
+
+    def swing(rebuilt):
+        return np.ptp((rebuilt[..., 0] - rebuilt[..., 2])[8:-8, 8:-8])
+
+    assert by_bilinear == swing(colour_demosaicing.demosaicing_CFA_Bayer_bilinear(measured, "RGGB"))
+    assert by_bilinear == swing(mosaics.demosaic(measured, rggb, "bilinear"))
+    assert swing(colour_demosaicing.demosaicing_CFA_Bayer_Menon2007(measured, "RGGB")) < 1e-6
+    for name in ("edge-aware", "Menon"):
+        assert swing(mosaics.demosaic(measured, rggb, name)) == pytest.approx(0, abs=1e-6)
+    chessboard, magenta = np.indices((8, 8)).sum(axis=0) % 2 == 0, np.broadcast_to([0.9, 0.1, 0.9], (8, 8, 3))
+    np.testing.assert_allclose(mosaics.mosaic(magenta, rggb), np.where(chessboard, 0.9, 0.1))
+    says("The raw file holds the same mosaic, and the same algorithm makes the same bands of it.")

@@ -520,7 +520,7 @@ def test_metamers_are_equal_to_the_sensor_and_far_apart_to_the_eye(says):
     assert colour.delta_E(one, other, method="CIE 2000") > 10
     (made,) = says("one that was computed for this sensor in daylight of 5000 K")
     (at,) = says("At 5000 K, **counted, × gains, × matrix: equal to the last digit.")
-    (alike,) = says("counted alike in daylight of 5000 K, and differently in every other light")
+    (alike,) = says("counted alike in daylight of 5000 K, and differently in the other lights that you set")
     assert made.value == at.value == alike.value == 5000
     says("In another light the sensor counts them differently, because the sums are others.")
     for other in (

@@ -479,15 +479,30 @@ def test_the_reference_data_set(says):
 
 
 def test_photons_stir_every_block(says):
-    full, held, grey, steps, bits = says(
-        "A pixel that is full at 10,000 electrons holds 3900 of them at a grey value of 100. The photons' noise is "
-        "then 1.6 steps of the 8 bits, enough to stir every block."
+    """A linear file, and sRGB's curve by IEC 61966-2-1, above its linear part."""
+    full, bits = says("Take a pixel that is full at 10,000 electrons, in a linear file of 8 bits.")
+    grey, held, steps = says("At a grey value of 100 it holds 3,900 of them, and the photons' noise is 1.6 steps.")
+    by_srgb, fewer = says(
+        "stands for 1,270 electrons, and the noise is 1.3 steps. Either is enough to stir every block."
     )
-    step = full.value / (2**bits.value - 1)
-    assert held.about(grey.value * step, within=0.01)
-    assert steps == np.sqrt(held.value) / step
-    drawn = np.rint(np.random.default_rng(12).poisson(held.value, (20_000, 64)) / step)
-    assert (np.ptp(drawn, axis=1) > 0).all()
+    white = 2**bits.value - 1
+    linear = (grey.value / white, lambda share: share)
+    srgb = ((grey.value / white + 0.055) / 1.055) ** 2.4, lambda share: 1.055 * share ** (1 / 2.4) - 0.055
+    for (share, encoded), said, noise in ((linear, held, steps), (srgb, by_srgb, fewer)):
+        assert said.about(full.value * share, within=0.006)
+        drawn = np.random.default_rng(12).poisson(full.value * share, (20_000, 64)) / full.value
+        values = white * encoded(drawn)
+        assert noise == np.std(values)
+        assert (np.ptp(np.rint(values), axis=1) > 0).all()
+
+
+def test_the_line_of_slope_a_half_stands_at_the_root_of_K(says):
+    """Poisson counts times K: their deviation over the root of their mean, both in DN, is √K."""
+    (at,) = says("it is σ = √(K · signal), so at a signal of 1 DN its height is √K")
+    counts = np.random.default_rng(15).poisson(4_000, 400_000)
+    for K in (0.25, 0.5, 2.0):
+        root = np.sqrt(np.mean(K * counts) / at.value)
+        assert np.std(K * counts) / root == pytest.approx(np.sqrt(K), rel=0.01)
 
 
 def rounded_variance(ratio):

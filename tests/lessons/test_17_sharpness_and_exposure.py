@@ -585,7 +585,7 @@ def test_the_discs_are_equally_wide_where_the_picture_is_sharpest(says):
     (best,) = says("It is largest near f/5.6, where both discs are about equally wide.")
     assert 40 / best.value == pytest.approx(2 * brentq(j1, 3, 4.5) / np.pi * 0.55 * best.value, rel=0.1)
     assert max((1.4, 2, 2.8, 4, 5.6, 8, 11, 16), key=lambda N: mtf50(N, 0.04 / N, 0.004)) == best.value
-    says("Set defocus to 0: now a larger opening is always sharper.")
+    says("Set defocus to 0: without aberrations, a larger opening is now always sharper.")
     assert np.all(np.diff([mtf50(N, 0, 0.004) for N in (1.4, 2.8, 5.6, 11, 22)]) < 0)
     says("Nothing in this picture is out of focus.")
     sharp, soft = (SharpnessView(pitch_um=2.0, f_number=N).image()[..., 1] for N in (5.6, 32.0))

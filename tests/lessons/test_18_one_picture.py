@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from quoting import LESSONS
 from scipy.linalg import rq
+from scipy.optimize import brentq
 
 from camviz.cameras import Camera
 from camviz.poses import RigidTransform, Rotation
@@ -157,8 +158,8 @@ def test_heights(says):
     for z in (5.0, distance.value, 40.0):  # the top stays on the horizon
         top = by_opencv(StaffView().camera, [[0.6, 0, z]])[0]
         assert top[1] == pytest.approx(StaffView().horizon_row, abs=1e-9)
-    (barn,) = says("You photograph a flat field from the top of a 3 m ladder.")
-    (height,) = says("At the height of the camera, some 3 m above the field.")
+    (barn,) = says("Your camera is 3 m above a flat field.")
+    (height,) = says("At the height of the camera, 3 m above the field.")
     assert barn.value == height.value
     (belt,) = says("the horizon crosses a man at his belt, 1 m above the sand")
     (pole,) = says("4 m")
@@ -186,7 +187,7 @@ def test_a_level_rule_in_a_tilted_picture(says):
 
 
 def principal_points(tilt, noise, count=400):
-    """Principal points (count, 2) from three vanishing points, by least squares over all three heights."""
+    """Principal points (count, 2) from three vanishing points, by least squares over all three altitudes."""
     rng, found = np.random.default_rng(5), []
     lines = VanishingView(tilt_deg=tilt, upright=True).lines
     for _ in range(count):
@@ -202,9 +203,12 @@ def test_three_points_find_the_middle_and_are_delicate(says):
     cropped = [crossing(both) - (columns.value, 0) for both in lines.values()]
     found = exercise("18.principal_point").reference(*cropped)
     np.testing.assert_allclose(found, (319.5 - columns.value, 239.5), atol=1e-6)
-    noise, tilt, across = says(
-        "With ends of lines off by 0.5 px and a tilt of 12°, the principal point scatters by 8 px"
-    )
+    noise, wide = says("Let the ends of the lines be off by 0.5 px. This picture is 640 px wide")
+    (finer,) = says("pictures, 1280 pixels wide")
+    says("so that is twice as much as in section 2")
+    assert finer.value / wide.value == 2
+    assert wide == VanishingView().camera.intrinsics.width
+    tilt, across = says("At a tilt of 12° the principal point then scatters by 8 px across")
     (down,) = says("px across and by 3 px down (standard deviations)")
     scatter = principal_points(tilt.value, noise.value).std(axis=0)
     assert across == scatter[0]
@@ -311,6 +315,68 @@ def test_the_horizon_tells_how_the_camera_stood(says):
         assert np.degrees(np.arctan(aside / d)) == pytest.approx(90 + HEADING_DEG + turn, abs=1e-4)
 
 
+def test_the_distance_of_two_points_does_not_tell_f(says):
+    """OpenCV's pixels of both directions: the distance changes with the turn, −(q₁ − c)·(q₂ − c) does not."""
+    f, at_0, none, at_25, turn = says("At f = 417 px the points are 839 px apart at a turn of 0°, and 1,492 px at 25°.")
+    middle, directions = np.array([319.5, 239.5]), [(-1e9, 0, 0), (0, 0, 1e9)]
+    for degrees, apart in ((none.value, at_0), (turn.value, at_25)):
+        first, second = by_opencv(camera(degrees), directions)
+        assert apart == np.linalg.norm(second - first)
+        assert f == np.sqrt(-(first - middle) @ (second - middle))
+    says("So at the same turn their distance grows with the focal length.")
+    says("That gives the focal length, counted in widths of the picture, whichever way the camera was turned.")
+
+
+def test_any_known_angle_gives_an_equation_for_f(says):
+    """Of directions 60° apart only the true f makes rays 60° apart; at 90° a point at infinity tells none."""
+    says("Any known angle gives an equation for f; a right angle gives the short one above.")
+    says("For a right angle neither point may lie at infinity.")
+    says("A known angle, seen aslant, tells f.")
+    seen, middle = camera(0.0), np.array([319.5, 239.5])
+    R, (a, b) = seen.extrinsics[0], np.radians((-25, 35))
+    rays = np.array([(np.sin(a), 0, np.cos(a)), (np.sin(b), 0, np.cos(b))])
+    first, second = by_opencv(seen, 1e9 * rays @ R) - middle
+
+    def angle(f):
+        one, other = np.append(first, f), np.append(second, f)
+        return np.degrees(np.arccos(one @ other / np.linalg.norm(one) / np.linalg.norm(other)))
+
+    assert brentq(lambda f: angle(f) - 60, 50, 5000) == pytest.approx(seen.intrinsics.fx)
+    for f in (200.0, 800.0):  # at infinity along the rows: any f makes a right angle with the middle column
+        assert np.dot((1.0, 0, 0), np.append((0.0, 50), f)) == 0
+
+
+def test_each_gap_has_its_own_help(says):
+    """A wall seen squarely has both points at infinity; twice the scene and twice the step give the same pictures."""
+    says("The points of its level and of its upright edges are both at infinity")
+    square = camera(42.0, aside=-3.0)
+    for direction in ((-1.0, 0, 0), (0, 1.0, 0)):
+        assert (square.extrinsics[0] @ direction)[2] == pytest.approx(0, abs=1e-9)
+    says("A second picture from another place tells depth, and never the scale.")
+    R, t = square.extrinsics
+    one, twice = (
+        cv2.projectPoints(s * CORNERS, R, s * (t - (0.3, 0, 0)), square.intrinsics.K, None)[0] for s in (1, 2)
+    )
+    np.testing.assert_allclose(one, twice, atol=1e-9)
+    (square_on,) = says("right only in a level picture of walls both seen at 45°.")
+    f, both = 400.0, np.radians((square_on.value, 30))
+    halves = [f * (np.tan(angle) + 1 / np.tan(angle)) / 2 for angle in both]
+    assert halves[0] == pytest.approx(f)
+    assert halves[1] > 1.1 * f
+
+
+def test_rq_gives_a_rotation_where_the_sign_of_P_is_chosen(says):
+    says("writes any square matrix as an upper triangle times an orthogonal matrix")
+    (mirror,) = says("Where det R comes out as −1, take −P instead: then R is a rotation.")
+    seen = camera(7.0, 3.0)
+    P = seen.intrinsics.K @ np.column_stack(seen.extrinsics)
+    for sign in (1, mirror.value):
+        K, R = rq(sign * P[:, :3])
+        R = np.sign(np.diag(K))[:, None] * R
+        assert np.linalg.det(R) == pytest.approx(sign)
+        np.testing.assert_allclose(sign * R, seen.extrinsics[0], atol=1e-9)
+
+
 def test_a_corner_through_two_lenses(says):
     near, far = says("are 900 px apart in the first and 1800 px in the second")
     says("The second: its focal length is twice as long.")
@@ -325,7 +391,7 @@ def test_shapes_are_those_of_the_functions(says):
     one = np.full((5, int(points.value)), 40.0)
     assert exercise("18.focal_length").reference(one, -one, np.zeros(int(centre.value))).shape == (5,)
     (line,) = says("l the horizon as a line (3,)")
-    (upright,) = says("v the vanishing point of the upright lines (3,).")
+    (upright,) = says("q the vanishing point of the upright lines (3,).")
     (foot,) = says(
         "`foot`, `top`, `door_foot` and `door_top` are pixels (2,), `horizon` and `vertical` have three numbers."
     )

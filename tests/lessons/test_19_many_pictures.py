@@ -138,6 +138,53 @@ def test_parallax(says):
     assert shift == (before - after)[2]
 
 
+def test_the_inverse_depth_of_a_plane_is_linear_in_the_pixel(says):
+    """1/Z of the wall and of the floor, by the plane's equation, and f b/Z beside OpenCV's shifted pixels; Z is not."""
+    says("on a plane 1/Z is linear in the pixel. So the shift f b / Z is linear in it, too, and fits into H.")
+    pixels = np.stack(np.meshgrid([0.0, 200, 320, 639], [300.0, 350, 400, 479]), axis=-1).reshape(-1, 2)
+    x = np.column_stack([pixels, np.ones(len(pixels))])
+    rays, b = x @ np.linalg.inv(K).T, 0.3
+    for normal, offset in (((0, 1.0, 0), 1.25), ((0.3, -0.2, 1.0), 6.5)):
+        Z = offset / (rays @ normal)
+        shifted = cv2.projectPoints(Z[:, None] * rays, np.zeros(3), np.array([-b, 0, 0]), K, None)[0][:, 0]
+        np.testing.assert_allclose(pixels[:, 0] - shifted[:, 0], F * b / Z, atol=1e-9)
+        for values, linear in ((1 / Z, True), (Z, False)):
+            left = values - x @ np.linalg.lstsq(x, values, rcond=None)[0]
+            assert (np.abs(left).max() < 1e-9 * np.abs(values).max()) == linear
+
+
+def test_no_h_joins_everything_only_after_a_step(says):
+    says("For which of these four can no H join everything, even if every match is used and right?")
+    says("For the step alone, unless all that matters lies on one plane.")
+    says("After a turn the right H exists, and it still exists where noise and wrong matches make it hard to find.")
+    for options in ({"turn": 30.0}, {"noise": 2.0}, {"wrong": 50.0}):
+        _, uv, to = MosaicView(**options).exact  # every match, and each of them right
+        assert np.linalg.norm(carried(cv2.findHomography(uv, to)[0], uv) - to, axis=-1).max() < 1e-3
+    _, uv, to = MosaicView(step=0.3).exact
+    assert np.linalg.norm(carried(cv2.findHomography(uv, to)[0], uv) - to, axis=-1).max() > 5
+
+
+def test_what_stays_open_without_K(says):
+    """Any projective map of the scene gives the same pixels; square pixels tell f by E's two equal singular values."""
+    says("That holds for a known K. If K is unknown and free in every picture, more stays open")
+    says("One constant K, or square pixels, usually allows auto-calibration: the pictures then tell K as well")
+    scene, rng = true_scene(), np.random.default_rng(19)
+    X = np.column_stack([scene.points, np.ones(len(scene.points))])
+    bent = np.eye(4) + 0.1 * rng.normal(size=(4, 4))
+    for view, seen in zip(scene.cameras, scene.seen, strict=True):
+        P = view.intrinsics.K @ np.column_stack(view.extrinsics)
+        np.testing.assert_allclose(project(X @ bent.T, P @ np.linalg.inv(bent)), seen, atol=1e-6)
+    Fs = [cv2.findFundamentalMat(scene.seen[i], scene.seen[j], cv2.FM_8POINT)[0] for i, j in ((0, 1), (1, 2), (0, 2))]
+
+    def unlike(f):
+        guess = np.array([[f, 0, K[0, 2]], [0, f, K[1, 2]], [0, 0, 1]])
+        s = [np.linalg.svd(guess.T @ one @ guess, compute_uv=False) for one in Fs]
+        return sum((1 - each[1] / each[0]) ** 2 for each in s)
+
+    tried = np.linspace(200, 2000, 901)
+    assert tried[np.argmin([unlike(f) for f in tried])] == pytest.approx(CAMERA.intrinsics.fx, abs=3)
+
+
 def test_wrong_matches(says):
     says("In the garden about one match in ten is wrong")
     (numbers,) = says("describes the surroundings of each by 128 numbers")
@@ -176,10 +223,10 @@ def test_the_second_step(says):
     first, second = np.linalg.norm(np.diff(centres, axis=0), axis=1)
     assert (first, second) == pytest.approx(STEPS)
     assert ratio == second / first
-    assert np.abs(ThreeViews(length=ratio.value).errors).max() < 1e-9
-    assert np.linalg.norm(ThreeViews(length=1.0).errors[2], axis=-1).min() > 10
+    assert np.abs(ThreeViews(length=ratio.value).residuals).max() < 1e-9
+    assert np.linalg.norm(ThreeViews(length=1.0).residuals[2], axis=-1).min() > 10
     for scale in (0.2, 0.8):
-        assert np.abs(ThreeViews(length=ratio.value, scale=scale).errors).max() < 1e-9
+        assert np.abs(ThreeViews(length=ratio.value, scale=scale).residuals).max() < 1e-9
     three, again = says(
         "You get `points` (n, 3) in the second camera's frame, R and `direction` of third_from_second, "
         "and `rays` (n, 3)"
@@ -228,7 +275,7 @@ def bundle():
         ]
         world = x[12:].reshape(-1, 3)
         return np.concatenate(
-            [(project(world @ R.T + t, camera) - uv).ravel() for (R, t), uv in zip(each, seen, strict=True)]
+            [(uv - project(world @ R.T + t, camera)).ravel() for (R, t), uv in zip(each, seen, strict=True)]
         )
 
     end = least_squares(errors, start, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15).x
@@ -326,11 +373,31 @@ def test_opencv_s_points_are_the_true_ones_after_alignment(says):
     assert np.abs(ThreeViews(length=STEPS[1] / STEPS[0]).model[1] - points).max() <= 1e-6 * np.abs(points).max()
 
 
+def test_a_residual_is_detected_less_projected(says):
+    """A point detected 1 px to the right of its projection has the residual (+1, 0), as the glossary has it."""
+    says("is where a point was detected, less where the model projects it.")
+    scene = true_scene()
+    poses = [one.cam_from_world for one in scene.cameras]
+    turns, steps = np.array([[p.rotation.as_rotvec(), p.translation] for p in poses]).swapaxes(0, 1)
+    right = exercise("19.residuals").reference(turns, steps, scene.points, scene.seen + (1.0, 0.0), CAMERA.intrinsics.K)
+    np.testing.assert_allclose(right, np.broadcast_to([1.0, 0.0], right.shape), atol=1e-9)
+    model = ThreeViews(length=0.5 * STEPS[1] / STEPS[0])
+    (first, second), points = scene.pairs, model.model[1]
+    at = cv2.projectPoints(
+        (second.rotation * first.rotation).apply(points)
+        + second.rotation.apply(first.translation)
+        + model.length * second.translation,
+        np.zeros(3), np.zeros(3), CAMERA.intrinsics.K, None,
+    )[0][:, 0]  # fmt: skip
+    np.testing.assert_allclose(model.residuals[2], scene.seen[2] - at, atol=1e-9)
+
+
 def test_shapes_of_the_residuals(says):
-    three, again, two = says(
-        "For m cameras with rotation vectors `turns` (m, 3) and translations `steps` (m, 3), both cam_from_world, and "
-        "n points: where does each camera see each point, less where it was `seen` (m, n, 2)?"
+    three, again, two, same = says(
+        "You get rotation vectors `turns` (m, 3) and translations `steps` (m, 3) of m cameras, both cam_from_world, "
+        "n points, and where each camera has `seen` them (m, n, 2). Return the residuals (m, n, 2)."
     )
+    assert same == two.value
     R = Rotation.from_rotvec(np.zeros((4, 3))).as_matrix()
     assert three == again.value == R.shape[-1]
     assert two.value + 1 == R.shape[-1]

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import log
 
 from camviz_clinic.checks.doctor.shown import Shown
 from camviz_clinic.checks.doctor.trouble import trouble
 from camviz_clinic.checks.evidence import Evidence, NotChecked
-from camviz_clinic.checks.findings.pair import SAME_LENGTH, UNITS, baseline_scale
+from camviz_clinic.checks.findings.pair import UNITS, baseline_scale, confused_units
 
 
 @trouble("wrong unit", cause="the side of a square in metres or inches taken for millimetres", finding="baseline-scale")
@@ -30,6 +29,6 @@ def wrong_unit(shown: Shown) -> Iterator[tuple[str, str]]:
 def _side_mm(value: float, unit: str, side: float) -> float:
     """What the side of a square should be, in millimetres."""
     if unit == "times":
-        exact = min(UNITS, key=lambda factor: abs(log(value / factor)))
-        return 1000 * side / (exact if abs(log(value / exact)) < SAME_LENGTH else value)
+        units = confused_units(value)
+        return 1000 * side / (UNITS[units[1]] / UNITS[units[0]] if units else value)
     return side if value > 1 else 1e6 * side

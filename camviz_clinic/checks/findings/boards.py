@@ -24,6 +24,7 @@ COVERED = 0.4  # of the image: the outermost corners are a square inside the boa
 CELLS = 64  # along the longer side of the image, to measure areas
 WIDEST = radians(110)  # off the axis: the widest common fisheyes see 220°
 SAME_WAY_DEG = 20.0  # between the normals of two boards
+PARALLEL_DEG = 5.0  # between them: all such views together constrain a camera as one view does
 UNCERTAIN = 0.01  # of the focal length
 UNKNOWN = 1.0  # of it
 HELD_OUT = 2.0  # times what noise leads to
@@ -124,7 +125,9 @@ def boards_in_the_middle(rng: Rng, strength: float) -> Evidence:
     symptom="The focal length is uncertain, and correlated with the distance of the boards.",
     causes=("boards that were all held parallel to each other, usually to the image",),
     remedy="Add views with the board tilted by 30° to 45°, to different sides.",
-    threshold="No two boards are more than 20° apart, or the focal length is uncertain by more than 1 %.",
+    threshold="No two boards are more than 20° apart. "
+    "It is a fault where none are and the corners do not decide the focal length. "
+    "It is one, too, where none are more than 5° apart and the focal length is uncertain by more than 1 %.",
     explains=("unidentifiable", "aspect", "principal-point", "split-disagreement"),
 )
 def parallel_boards(evidence: Evidence) -> Iterator[Finding]:
@@ -133,19 +136,32 @@ def parallel_boards(evidence: Evidence) -> Iterator[Finding]:
     if not poses:
         raise NotChecked("it needs the poses of at least two boards, and the file has none")
     for name, pose in poses.items():
-        normals = pose.rotation.as_matrix()[..., 2]
-        spread = float(np.degrees(np.arccos(np.clip(normals @ normals.T, -1, 1).min())))
+        spread = tilt_spread_deg(evidence, name)
         uncertain = evidence.focal_uncertainty(name)
         if spread < SAME_WAY_DEG:
+            severity = "fault" if leave_focal_length_open(evidence, name) else "warning"
             more = "" if uncertain is None else f" The focal length is {_told(uncertain)}."
             sentence = f"{name}: no two of the {len(pose)} boards differ by more than {spread:.1f}° in tilt.{more}"
-            yield parallel_boards.found(sentence, spread, "°", name)
-        elif (open_left := _left_open(evidence, name)) is not None and open_left > UNCERTAIN:
-            sentence = (
-                f"{name}: the focal length is uncertain by {open_left:.2%} (1σ), with {len(pose)} boards whose tilts "
-                f"differ by up to {spread:.0f}°."
-            )
-            yield parallel_boards.found(sentence, open_left * 100, "%", name)
+            yield parallel_boards.found(sentence, spread, "°", name, severity=severity)
+
+
+def tilt_spread_deg(evidence: Evidence, name: str) -> float:
+    """The largest angle in degrees between the normals of two boards whose corners the fit uses; NaN without two."""
+    poses = evidence.cam_from_board.get(name)
+    if poses is None or poses.single or len(poses) < 2:
+        return np.nan
+    normals = poses.rotation.as_matrix()[..., 2]
+    if name in evidence.calibration.detections:
+        normals = normals[evidence.calibration.used(name).any(axis=1)]
+    return float(np.degrees(np.arccos(np.clip(normals @ normals.T, -1, 1).min(initial=1.0))))
+
+
+def leave_focal_length_open(evidence: Evidence, name: str) -> bool:
+    """Whether all boards of a camera are parallel, so that its focal length is not decided or not known to 1 %."""
+    spread = tilt_spread_deg(evidence, name)
+    if any("fx" in each.changes for each in evidence.undecided(name)):
+        return spread < SAME_WAY_DEG
+    return spread < PARALLEL_DEG and (_left_open(evidence, name) or 0.0) > UNCERTAIN
 
 
 def _told(uncertain: float) -> str:
@@ -183,6 +199,39 @@ def _left_open(evidence: Evidence, name: str) -> float | None:
 def all_parallel(rng: Rng, strength: float) -> Evidence:
     """No board is tilted by more."""
     set_up = single(rng, tilt_deg=(0, strength))
+    return Evidence(set_up.solved(set_up.observed(rng)))
+
+
+@finding(
+    "focal-uncertain",
+    severity="warning",
+    view="correlation",
+    symptom="The focal length is uncertain, though the boards are tilted.",
+    causes=(
+        "too few views, or boards too small in the image, for the noise of their corners",
+        "boards tilted to one side only",
+    ),
+    remedy="Add views with the board large in the image and tilted by 30° to 45°, to different sides.",
+    threshold="The focal length is uncertain by more than 1 % (1σ), with boards more than 20° apart.",
+    explains=("unidentifiable", "aspect", "principal-point", "split-disagreement"),
+)
+def focal_uncertain(evidence: Evidence) -> Iterator[Finding]:
+    """The check reads the standard deviation of fx in the file, or computes it from the corners."""
+    known = {name: each for name in evidence.cameras if (each := _left_open(evidence, name)) is not None}
+    if not known:
+        raise NotChecked("the file holds neither corners of a known board nor how well the focal length is known")
+    for name, uncertain in known.items():
+        spread = tilt_spread_deg(evidence, name)
+        if uncertain > UNCERTAIN and not spread < SAME_WAY_DEG:
+            tilts = "" if np.isnan(spread) else f", though the boards' tilts differ by up to {spread:.0f}°"
+            sentence = f"{name}: the focal length is {_told(uncertain)}{tilts}."
+            yield focal_uncertain.found(sentence, uncertain * 100, "%", name)
+
+
+@focal_uncertain.fault("few noisy views", "px of noise", (0.1, 1, 5), promised=5)
+def few_noisy_views(rng: Rng, strength: float) -> Evidence:
+    """Five views of tilted boards have corners with so much noise."""
+    set_up = replace(single(rng, views=5), noise=strength)
     return Evidence(set_up.solved(set_up.observed(rng)))
 
 

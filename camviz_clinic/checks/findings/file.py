@@ -10,7 +10,7 @@ import yaml
 
 from camviz.cameras import Camera
 from camviz.lenses import BrownConrady, Cylindrical, Equirectangular, KannalaBrandt, Perspective
-from camviz_clinic.calibration.types import CalibrationError
+from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.registry import VIEW_BY_VIEW, WRONG_NUMBERS, Finding, Rng, finding
 from camviz_clinic.checks.virtual import alone, as_file, healthy, healthy_pair, single, spread_boards
@@ -38,7 +38,7 @@ def named(evidence: Evidence, id: str) -> list[CalibrationError]:
 def not_a_rotation(evidence: Evidence) -> Iterator[Finding]:
     """The check reads the rotations in the file."""
     for fault in named(evidence, "not-a-rotation"):
-        yield not_a_rotation.found(f"{fault}.", fault.value)
+        yield not_a_rotation.of_file(fault)
 
 
 @not_a_rotation.fault("edited rotation", "", (0.0002, 0.01, 0.3), promised=0.01)
@@ -64,22 +64,78 @@ def without_k3(camera: Camera) -> BrownConrady:
     symptom="K is transposed, or K[2, 2] is not 1.",
     causes=("MATLAB's IntrinsicMatrix, which is the transpose of K", "a matrix that was scaled as a whole"),
     remedy="Transpose K, or divide it by K[2, 2].",
-    threshold="K is not upper triangular, its last element is not 1, or a focal length is not positive.",
+    threshold="K is not upper triangular, or its last element is not 1.",
     explains=WRONG_NUMBERS,
 )
 def bad_k(evidence: Evidence) -> Iterator[Finding]:
     """The check reads the camera matrix in the file."""
     for fault in named(evidence, "bad-k"):
-        yield bad_k.found(f"{fault}.", fault.value)
+        yield bad_k.of_file(fault)
 
 
 @bad_k.fault("transposed K", "times", (1, 2, 0.001), promised=1)
 def transposed(rng: Rng, strength: float) -> Evidence:
     """K is transposed (1), or multiplied."""
     solved = healthy(rng)
-    tree, K = yaml.safe_load(ros.write(solved)), solved.cameras["camera"].intrinsics.K
+    tree, K = yaml.safe_load(ros.write_one(solved)), solved.cameras["camera"].intrinsics.K
     tree["camera_matrix"]["data"] = (K.T if strength == 1 else strength * K).ravel().tolist()
     return as_file(yaml.safe_dump(tree))
+
+
+@finding(
+    "not-calibrated",
+    severity="fault",
+    view="numbers",
+    symptom="The camera is not calibrated: a focal length is 0.",
+    causes=("a driver or a template that writes a camera matrix of zeros until the camera is calibrated",),
+    remedy="Calibrate the camera (camviz calibrate), and give the driver the file.",
+    threshold="fx or fy is 0.",
+)
+def not_calibrated(evidence: Evidence) -> Iterator[Finding]:
+    """The check reads the focal lengths in the file. Such a file is not read any further."""
+    return (not_calibrated.of_file(fault) for fault in named(evidence, "not-calibrated"))
+
+
+@not_calibrated.fault("camera not calibrated", "", (1, 2), promised=1)
+def zero_matrix(rng: Rng, strength: float) -> Evidence:
+    """K is 0 (1), or fx alone (2)."""
+    solved = healthy(rng)
+    grid = solved.cameras["camera"].intrinsics
+    return _refused(solved, [0.0] * 9 if strength == 1 else [0.0, 0.0, grid.cx, 0.0, grid.fy, grid.cy, 0.0, 0.0, 1.0])
+
+
+def _refused(solved: Calibration, K: list[float]) -> Evidence:
+    """The numbers of a camera alone, beside why a file with this K is refused."""
+    tree = yaml.safe_load(ros.write_one(solved))
+    tree["camera_matrix"]["data"] = K
+    try:
+        return as_file(yaml.safe_dump(tree))
+    except CalibrationError as error:
+        return Evidence(replace(alone(solved), faults=(error,)))
+
+
+@finding(
+    "reversed-axis",
+    severity="fault",
+    view="numbers",
+    symptom="A focal length is negative: an axis of the camera points the other way.",
+    causes=("a camera of another convention, whose y axis points up (OpenGL) or whose x axis points left",),
+    remedy="Write the focal lengths as positive numbers, and turn the same axes of the camera's pose.",
+    threshold="fx or fy is negative.",
+)
+def reversed_axis(evidence: Evidence) -> Iterator[Finding]:
+    """The check reads the focal lengths in the file. Such a file is not read any further."""
+    return (reversed_axis.of_file(fault) for fault in named(evidence, "reversed-axis"))
+
+
+@reversed_axis.fault("axis reversed", "", (1, 2, 3), promised=1)
+def negative_focal_length(rng: Rng, strength: float) -> Evidence:
+    """The sign of fy (1), of fx (2) or of both (3) is changed."""
+    signs = {1: [1, -1], 2: [-1, 1], 3: [-1, -1]}[round(strength)]
+    solved = healthy(rng)
+    grid = solved.cameras["camera"].intrinsics
+    K = [signs[0] * grid.fx, 0.0, grid.cx, 0.0, signs[1] * grid.fy, grid.cy, 0.0, 0.0, 1.0]
+    return _refused(solved, K)
 
 
 @finding(
@@ -87,21 +143,24 @@ def transposed(rng: Rng, strength: float) -> Evidence:
     severity="fault",
     view="numbers",
     symptom="The number of distortion coefficients does not fit the name of the model.",
-    causes=("coefficients of one model under the name of another, such as 8 as plumb_bob",),
-    remedy="Write the name that fits the coefficients (8: rational_polynomial), or solve with the model you meant.",
+    causes=(
+        "coefficients of one model under the name of another, such as 8 as plumb_bob",
+        "a program that left zeros out at the end, or added some",
+    ),
+    remedy="Give the model as many coefficients as it has, or write the name of the model that has as many.",
     threshold="The model has another number of coefficients.",
     explains=WRONG_NUMBERS,
 )
 def coefficient_count(evidence: Evidence) -> Iterator[Finding]:
     """The check reads the coefficients and the name of the model in the file."""
     for fault in named(evidence, "coefficient-count"):
-        yield coefficient_count.found(f"{fault}.", fault.value, "coefficients")
+        yield coefficient_count.of_file(fault, "coefficients")
 
 
 @coefficient_count.fault("mislabelled coefficients", "numbers", (4, 5, 8), promised=4)
 def mislabelled(rng: Rng, strength: float) -> Evidence:
     """The file has another number of coefficients than the model's name."""
-    tree = yaml.safe_load(ros.write(healthy(rng)))
+    tree = yaml.safe_load(ros.write_one(healthy(rng)))
     held = tree["distortion_coefficients"]
     held["data"] = [*held["data"], 1e-3, 1e-4, 1e-5][: round(strength)]
     held["cols"] = len(held["data"])
@@ -116,7 +175,7 @@ def mislabelled(rng: Rng, strength: float) -> Evidence:
     symptom="All distortion coefficients are zero.",
     causes=("coefficients that were never estimated, or not kept", "a picture that was undistorted before"),
     remedy="Keep the coefficients that the calibration returns. If the pictures are undistorted already, "
-    "say so where the file can (rectified, PINHOLE).",
+    "write a format that has pinholes (camviz convert --to colmap), or pass --ignore zero-distortion.",
     threshold="All are zero and, where there are corners, k1 is at least five standard deviations from 0.",
     explains=(
         *VIEW_BY_VIEW,

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from math import cos, degrees, inf, isfinite, pi, radians
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -16,20 +17,25 @@ from camviz.distortion import (
     image_corner_radius,
     image_reach,
     is_rational,
+    pole_radius,
     valid_region,
     weakest_denominator,
 )
 from camviz.distortion.limits import NEARLY_A_POLE
 from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array, Lens, on_plane
+from camviz.lenses.declarations import Fold
 from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.enumeration import enumerated
 from camviz_clinic.calibration.types import Calibration
 from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.registry import Finding, Rng, finding
 from camviz_clinic.checks.virtual import alone, healthy
 
 LOST = 0.01  # of the pixels, fewer than which may fold
+MAX_FOLDED_BEYOND_CORNERS = 0.1  # of the pixels: a fold that takes more is a fault, wherever corners were seen
 CLOSE_PX = 0.5  # how well a pixel must return from OpenCV's inverse
+STEPS = (100, 1000)  # of OpenCV's inverse, tried in this order
 NEARLY_SIDEWAYS = cos(radians(85))  # beyond, a ray has no point on the plane z = 1 worth the name
 
 
@@ -40,8 +46,8 @@ NEARLY_SIDEWAYS = cos(radians(85))  # beyond, a ray has no point on the plane z 
     symptom="The border mirrors or folds back after undistortion.",
     causes=("a distortion polynomial that turns back inside the image", "no corners near the border in the fit"),
     remedy="Take fewer terms and solve again with more views that reach the border.",
-    threshold="Any such pixel lies on the border. It is a note where less than 1 % of the pixels are lost, beyond the "
-    "last corner of the board, and for a fisheye beyond 90°, whose picture may end before.",
+    threshold="Any such pixel lies on the border. It is a note where less than 1 % of the pixels are lost, and up to "
+    "10 % beyond the last corner of the board. So it is for a fisheye beyond 90°, whose picture may end before.",
     explains=("inverse-not-converged", "rectified-black"),
 )
 def fold(evidence: Evidence) -> Iterator[Finding]:
@@ -58,26 +64,48 @@ def fold(evidence: Evidence) -> Iterator[Finding]:
 def _fold(evidence: Evidence, name: str, camera: Camera) -> Iterator[Finding]:
     lens, turn = camera.lens, camera.lens.fold
     turns = turn is not None and turn.angle < inf
-    if _seen(camera, border_pixels(camera)).all() or not (turns or lens.may_mirror):
+    if _seen(camera, border_pixels(camera)).all() or not (turns or lens.may_mirror) or _ends_before_pole(lens):
         return
-    lost = 1 - float(valid_region(camera, max(1, camera.intrinsics.width // 128)).mean())
-    share = f"{lost:.0%}" if lost >= 0.01 else "less than 1 %"
-    sentence = f"{name}: {share} of the pixels have no ray of their own. The distortion {_where(camera)}."
+    lost = _lost(camera)
+    sentence = f"{name}: {_percent(lost)} of the pixels have no ray of their own. The distortion {_where(camera)}."
     if turn is None or not turns:
         yield fold.found(sentence, lost, "", name)
         return
     corners = evidence.calibration.detections.get(name)
-    seen = corners is not None and not _corners_lost(evidence, name, camera)
+    seen = corners is not None and not _corners_lost(evidence, name, camera) and lost <= MAX_FOLDED_BEYOND_CORNERS
     beyond = turn.angle >= pi / 2 and not _corners_lost(evidence, name, camera)
     severity = "note" if beyond or seen or lost < LOST else fold.severity
-    remedy = f"{_fewer_terms(lens)}, and solve again with more views that reach the border."
-    yield fold.found(sentence, turn.radius, turn.unit, name, severity=severity, remedy=remedy)
+    yield fold.found(sentence, turn.radius, turn.unit, name, severity=severity, remedy=_unfolded(camera, turn))
 
 
-def _fewer_terms(lens: Lens) -> str:
-    """What to do without, in the terms of this lens: its last radial one that is not 0."""
+def _lost(camera: Camera) -> float:
+    """The fraction of the pixels at which no ray arrives."""
+    return 1 - float(valid_region(camera, max(1, camera.intrinsics.width // 128)).mean())
+
+
+def _percent(fraction: float) -> str:
+    return f"{fraction:.0%}" if fraction >= 0.01 else "less than 1 %"
+
+
+def _ends_before_pole(lens: Lens) -> bool:
+    """Whether a pole ends the lens that its numerator almost cancels: `near_pole` reports it."""
+    return isinstance(lens, BrownConrady) and lens.cancelled_radius <= lens.limit_radius < inf
+
+
+def _unfolded(camera: Camera, turn: Fold) -> str:
+    """What takes the fold out of the image: the fewest radial terms without which there is none, each choice tried."""
+    lens: Any = camera.lens
     used = [name for name in lens.parameters() if name.startswith("k") and getattr(lens, name)]
-    return f"Fix {used[-1]} to 0" if len(used) > 1 else "Take a model with other terms"
+    for count in range(1, len(used)):
+        left_out = tuple(used[-count:])
+        without = replace(camera, lens=replace(lens, **dict.fromkeys(left_out, 0.0)))
+        if _seen(without, border_pixels(without)).all():
+            return f"Fix {enumerated(left_out)} to 0, and solve again with more views that reach the border."
+    radius = turn.image * min(camera.intrinsics.fx, camera.intrinsics.fy)
+    return (
+        "Solve again with more views that reach the border, with all of the model's radial terms. "
+        f"Until then use only pixels within {radius:.0f} px of the principal point."
+    )
 
 
 def _where(camera: Camera) -> str:
@@ -138,15 +166,21 @@ def near_pole(evidence: Evidence) -> Iterator[Finding]:
     if not rational:
         raise NotChecked("no lens here has a denominator (k4 k5 k6)")
     for name, camera in rational.items():
-        reach = image_reach(camera)
-        radius, least = weakest_denominator(camera.lens, reach)
-        if least < NEARLY_A_POLE:
-            what = "passes through 0, which is a pole," if least <= 0 else f"falls to {least:.3g}"
-            sentence = (
-                f"{name}: the denominator of the rational model {what} at r = {radius:.3g} focal lengths. "
-                f"The image reaches to {reach:.3g}."
-            )
-            yield near_pole.found(sentence, least, "", name)
+        lens, reach = camera.lens, image_reach(camera)
+        radius, least = weakest_denominator(lens, reach)
+        pole, cut = pole_radius(lens), _ends_before_pole(lens) and not _seen(camera, border_pixels(camera)).all()
+        if pole <= reach or cut:
+            what, radius, least = "is 0, which is a pole,", pole, min(least, 0.0)
+        elif least < NEARLY_A_POLE:
+            what = f"falls to {least:.3g}"
+        else:
+            continue
+        lost = f" Beyond it {_percent(_lost(camera))} of the pixels have no ray." if cut else ""
+        sentence = (
+            f"{name}: the denominator of the rational model {what} at r = {radius:.4f} focal lengths. "
+            f"The image reaches to {reach:.4f}.{lost}"
+        )
+        yield near_pole.found(sentence, least, "", name)
 
 
 @near_pole.fault("near-pole rational model", "", (0.5, 0.15, 0.05), promised=0.15)
@@ -184,7 +218,7 @@ def inverse_not_converged(evidence: Evidence) -> Iterator[Finding]:
     if not known:
         raise NotChecked("OpenCV's undistortPoints is not for these lenses")
     for name, camera in known.items():
-        error = default_round_trip(camera)
+        error = round_trip(camera)
         if not error <= CLOSE_PX:
             off = f"{error:.2g} px" if error < 1000 else "more than 1000 px"
             fisheye = _opencv_model(camera.lens) == "cv2.fisheye"
@@ -192,13 +226,24 @@ def inverse_not_converged(evidence: Evidence) -> Iterator[Finding]:
             sentence = f"{name}: {called} without criteria leaves points at the border {off} off."
             said = {
                 "causes": (f"{called}, which stops after a few iterations unless it is told otherwise",),
-                "remedy": inverse_not_converged.remedy.replace("undistortPoints", called, 1),
+                "remedy": _converging(camera, called),
             }
             yield inverse_not_converged.found(sentence, min(error, 1e6), "px", name, **said)
 
 
-def default_round_trip(camera: Camera) -> float:
-    """The largest distance in pixels between a border pixel and its return from OpenCV's inverse with its defaults."""
+def _converging(camera: Camera, called: str) -> str:
+    """The fewest of some iterations that bring OpenCV's inverse home in this camera, each tried."""
+    steps = next((each for each in STEPS if round_trip(camera, each) <= CLOSE_PX), None)
+    if steps is None:
+        return f"{called} does not converge here. Use camera.unproject of camviz.load, or the maps of camviz lut."
+    return inverse_not_converged.remedy.replace("undistortPoints", called, 1).replace("100", str(steps))
+
+
+def round_trip(camera: Camera, steps: int | None = None) -> float:
+    """The largest distance in pixels between a border pixel and its return from OpenCV's inverse.
+
+    OpenCV takes so many `steps`, or its default criteria.
+    """
     intrinsics, lens = camera.intrinsics, camera.lens
     pixels = border_pixels(camera)
     forward = lens.unproject(intrinsics.from_pixels(pixels))[..., 2]  # NaN where the lens folds
@@ -206,7 +251,7 @@ def default_round_trip(camera: Camera) -> float:
     if not len(pixels):
         return 0.0
     with np.errstate(all="ignore"):
-        back = INVERSES[_opencv_model(lens)](camera, pixels)
+        back = INVERSES[_opencv_model(lens)](camera, pixels, steps)
         error = float(np.linalg.norm(back - pixels, axis=-1).max())
     return error if isfinite(error) else 1e6
 
@@ -216,15 +261,23 @@ def _opencv_model(lens: Lens) -> str:
     return next((each.model for each in lens.spellings if each.program == "opencv"), "")
 
 
-def _calib3d_and_back(camera: Camera, pixels: Array) -> Array:
+def _criteria(steps: int | None) -> dict[str, Any]:
+    return {} if steps is None else {"criteria": (cv2.TERM_CRITERIA_MAX_ITER | cv2.TERM_CRITERIA_EPS, steps, 1e-9)}
+
+
+def _calib3d_and_back(camera: Camera, pixels: Array, steps: int | None) -> Array:
     K, coefficients = camera.intrinsics.K, np.array(_values(camera.lens))
-    ideal = cv2.undistortPoints(pixels.reshape(-1, 1, 2), K, coefficients).reshape(-1, 2)
+    if steps is not None and hasattr(cv2, "undistortPointsIter"):  # what OpenCV 4 calls it with criteria
+        ideal = cv2.undistortPointsIter(pixels.reshape(-1, 1, 2), K, coefficients, None, None, **_criteria(steps))
+    else:
+        ideal = cv2.undistortPoints(pixels.reshape(-1, 1, 2), K, coefficients, **_criteria(steps))
+    ideal = ideal.reshape(-1, 2)
     return camera.intrinsics.to_pixels(camera.lens.project_unchecked(on_plane(ideal)))
 
 
-def _fisheye_and_back(camera: Camera, pixels: Array) -> Array:
+def _fisheye_and_back(camera: Camera, pixels: Array, steps: int | None) -> Array:
     K, coefficients = camera.intrinsics.K, np.array(_values(camera.lens))
-    ideal = cv2.fisheye.undistortPoints(pixels.reshape(-1, 1, 2), K, coefficients)
+    ideal = cv2.fisheye.undistortPoints(pixels.reshape(-1, 1, 2), K, coefficients, **_criteria(steps))
     return cv2.fisheye.distortPoints(ideal.reshape(-1, 1, 2), K, coefficients).reshape(-1, 2)
 
 
@@ -232,7 +285,7 @@ def _values(lens: Lens) -> list[float]:
     return [getattr(lens, name) for name in lens.parameters()]
 
 
-INVERSES: dict[str, Callable[[Camera, Array], Array]] = {
+INVERSES: dict[str, Callable[[Camera, Array, int | None], Array]] = {
     "distortion_coefficients": _calib3d_and_back,
     "cv2.fisheye": _fisheye_and_back,
 }

@@ -231,7 +231,7 @@ def autofocus_drift(rng: Rng, set_up: SetUp, strength: float) -> SetUp:
     view="difference",
     symptom="Everything is shifted by a constant half pixel.",
     causes=("a program that wrote the centre of the first pixel as (0.5, 0.5) or (1, 1)",),
-    remedy="Subtract 0.5 (COLMAP, nerfstudio) or 1 (MATLAB) from cx and cy, or from the corners.",
+    remedy="Take the shift of 0.5 (COLMAP, nerfstudio) or 1 (MATLAB) off cx and cy, or off the corners.",
     threshold="The shift is the same in x and y, within 0.1 px of a half or a whole pixel. "
     "It is at least five standard errors from none.",
 )
@@ -273,7 +273,9 @@ def _is_shift(shift: Array) -> bool:
 
 def _shift_found(name: str, shift: Array, where: str) -> Finding:
     sentence = f"{name}: pixels are shifted by ({shift[0]:+.2f}, {shift[1]:+.2f}) {where}."
-    return half_pixel.found(sentence, float(np.abs(shift).mean()), "px", name)
+    dx, dy = np.copysign(min(SHIFTS, key=lambda size: abs(abs(shift[0]) - size)), shift)
+    remedy = f"Change cx by {dx:+g} px and cy by {dy:+g} px, or the corners by as much the other way."
+    return half_pixel.found(sentence, float(np.abs(shift).mean()), "px", name, remedy=remedy)
 
 
 @half_pixel.fault(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,15 +15,18 @@ from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.checks import virtual
 from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.findings.file import named
-from camviz_clinic.checks.registry import Finding, Rng, finding
-from camviz_clinic.checks.rig import OWN_UNIT, StereoPair, fits_better
+from camviz_clinic.checks.pair_difference import pair_differences
+from camviz_clinic.checks.registry import WRONG_NUMBERS, Finding, Rng, finding
+from camviz_clinic.checks.rig import OWN_UNIT, StereoPair, corner_errors, fits_better, lone_poses, middlemost
 from camviz_clinic.checks.virtual import healthy_pair
 
 LENGTHS = (0.001, 10.0)  # metres between which the baseline of a pair is not worth a word
 SQUARES = (0.0005, 0.5)  # the same for the side of a square
 SAME_LENGTH = 0.02
-UNITS = {1 / 1000: "metres", 1 / 10: "centimetres", 1 / 25.4: "inches", 1000: "micrometres"}
-"""By how many times too long lengths are that are in these and taken for millimetres."""
+UNITS = {"metres": 1.0, "feet": 0.3048, "inches": 0.0254, "centimetres": 0.01, "millimetres": 0.001}  # in metres
+TAKEN_FOR = ("metres", "millimetres", "centimetres")  # what programs and options ask for, the commonest first
+EXCHANGED_TIMES = 1.05  # by which the median error of the corners falls in both cameras, with the other camera's lens
+OTHER_CALIBRATION = "the other calibration"
 BLACK = 0.4  # of a rectified picture
 TURNED_DEG = 35.0
 
@@ -33,7 +37,7 @@ TURNED_DEG = 35.0
     view="boards",
     symptom="The baseline has the wrong sign.",
     causes=("a left and a right camera that were swapped",),
-    remedy="Swap the cameras, or the roles of the files, and solve again.",
+    remedy="Exchange the names left and right, with their pictures.",
     threshold="t.x is above 0 and the larger part of the baseline.",
     explains=("rectified-black",),
 )
@@ -71,14 +75,10 @@ swapped = baseline_sign.fault("swapped cameras", "", (1,), promised=1)(_exchange
     severity="fault",
     view="boards",
     symptom="The baseline has the wrong length.",
-    causes=(
-        "the side of a square in millimetres taken for metres",
-        "another side of a square in one of the solutions",
-    ),
-    remedy="Give the side of the board's squares in metres (camviz calibrate: --square-mm) and solve again, "
-    "or scale all translations.",
-    threshold="The baseline is 2 % off other evidence, above 10 m or below 1 mm. "
-    "Or a square is above half a metre or below half a millimetre.",
+    causes=("one unit of length taken for another", "another side of a square in one of the solutions"),
+    remedy="Scale all translations, or solve again with the side of the board's squares as measured (--square-mm).",
+    threshold="The baseline is 2 % off other evidence, above 10 m or below 1 mm. A unit is named within 2 % of its "
+    "ratio. Or a square is above half a metre or below half a millimetre.",
 )
 def baseline_scale(evidence: Evidence) -> Iterator[Finding]:
     """The check compares the baseline with its measured length, with the board poses of the same file, with the other
@@ -116,13 +116,9 @@ def _baseline(evidence: Evidence, pair: StereoPair) -> Iterator[Finding]:
     """The first evidence that speaks, the strongest first."""
     length = pair.baseline
     for known, said in _known_lengths(evidence, pair):
-        if abs(np.log(length / known)) > SAME_LENGTH:
-            ratio = length / known
-            sentence = (
-                f"{pair.title}: the baseline is {length:.4g} m long, {ratio:.4g} times the {known:.4g} m of {said}."
-                + _as_if(ratio)
-            )
-            yield baseline_scale.found(sentence, ratio, "times", pair.right)
+        ratio = length / known
+        if abs(np.log(ratio)) > SAME_LENGTH:
+            yield _other_unit(pair, known, said) or _other_length(evidence, pair, known, said)
             return
     if not LENGTHS[0] <= length <= LENGTHS[1]:
         unit = "millimetres" if length > 1 else "kilometres"
@@ -130,12 +126,46 @@ def _baseline(evidence: Evidence, pair: StereoPair) -> Iterator[Finding]:
         yield baseline_scale.found(sentence, length, "m", pair.right)
 
 
-def _as_if(ratio: float) -> str:
-    """What units one took for another where lengths are so many times too long; empty where it is none."""
-    for factor, units in UNITS.items():
-        if abs(np.log(ratio / factor)) < SAME_LENGTH:
-            return f" {units.capitalize()} were taken for millimetres."
-    return ""
+def _other_unit(pair: StereoPair, known: float, said: str) -> Finding | None:
+    """The baseline beside a known length in metres, where their ratio is that of two units."""
+    ratio = pair.baseline / known
+    units = confused_units(ratio)
+    if units is None:
+        return None
+    cause = f"{units[0]} taken for {units[1]}"
+    sentence = (
+        f"{pair.title}: the baseline is {pair.baseline:.4g} m long, {ratio:.4g} times the {known:.4g} m of {said}. "
+        f"{units[0].capitalize()} were taken for {units[1]}."
+    )
+    remedy = f"Divide all translations by {ratio:.4g}, or solve again with the side of a square in mm (--square-mm)."
+    return baseline_scale.found(sentence, ratio, "times", pair.right, causes=(cause,), remedy=remedy)
+
+
+def confused_units(ratio: float) -> tuple[str, str] | None:
+    """The unit that lengths have, and the one they were taken for, where they are so many times too long."""
+    for taken_for in TAKEN_FOR:
+        for unit, size in UNITS.items():
+            if unit != taken_for and abs(np.log(ratio * size / UNITS[taken_for])) < SAME_LENGTH:
+                return unit, taken_for
+    return None
+
+
+def _other_length(evidence: Evidence, pair: StereoPair, known: float, said: str) -> Finding:
+    """The baseline beside a known length in metres, from which no unit leads to it."""
+    off, ratio = 1000 * (pair.baseline - known), pair.baseline / known
+    sentence = (
+        f"{pair.title}: the baseline is {1000 * pair.baseline:.4g} mm, {abs(off):.2g} mm ({abs(ratio - 1):.1%}) "
+        f"{'longer' if off > 0 else 'shorter'} than the {1000 * known:.4g} mm of {said}."
+    )
+    if said != OTHER_CALIBRATION:
+        remedy = f"Multiply all translations by {1 / ratio:.5g}, or solve again with the side of a square as measured."
+        causes = ("another side of a square than the board has", "cameras that were moved")
+        return baseline_scale.found(sentence, ratio, "times", pair.right, causes=causes, remedy=remedy)
+    depths = [each.depth_sentence for each in pair_differences(evidence) if each.pair == pair.title]
+    remedy = f"Measure the baseline and give it (--baseline-mm). One of the two must be scaled {1 / ratio:.5g} times."
+    causes = ("another side of a square in one of the two solutions", "cameras that were moved between the two")
+    sentence = " ".join([sentence, *depths])
+    return baseline_scale.found(sentence, ratio, "times", pair.right, causes=causes, remedy=remedy)
 
 
 def _known_lengths(evidence: Evidence, pair: StereoPair) -> Iterator[tuple[float, str]]:
@@ -148,7 +178,18 @@ def _known_lengths(evidence: Evidence, pair: StereoPair) -> Iterator[tuple[float
     if {pair.left, pair.right} <= set(others):
         length = float(np.linalg.norm(others[pair.left].centre - others[pair.right].centre))
         if length > 0:
-            yield length, "the other calibration"
+            yield length, OTHER_CALIBRATION
+
+
+@baseline_scale.fault("two baselines", "%", (1, 3, 10), promised=3)
+def two_baselines(rng: Rng, strength: float) -> Evidence:
+    """The baseline is longer than in another calibration, and the file has no corners."""
+    solved = healthy_pair(rng)
+    right = solved.cameras["right"]
+    pose = right.world_from_cam
+    moved = RigidTransform.from_components(pose.translation * (1 + strength / 100), pose.rotation)
+    cameras = {**solved.cameras, "right": right.at(moved)}
+    return Evidence(Calibration(cameras, Path("virtual"), "OpenCV FileStorage, stereo"), solved)
 
 
 @baseline_scale.fault("square in millimetres", "times itself", (1000,), promised=1000)
@@ -164,6 +205,73 @@ def wrong_square(rng: Rng, strength: float) -> Evidence:
     set_up = virtual.pair(rng)
     good, bad = (set_up.solved(set_up.observed(rng), square=1 + off / 100) for off in (0, strength))
     return Evidence(bad, good)
+
+
+@finding(
+    "sides-exchanged",
+    severity="fault",
+    view="epipolar-pairs",
+    symptom="Left and right are exchanged.",
+    causes=("camera matrices written in the other order", "folders of pictures given in the other order"),
+    remedy="Exchange the two camera matrices with their distortion, or the two folders of pictures.",
+    threshold="With the other camera's lens the corners of both cameras fit 1.05 times better (median).",
+    explains=(
+        *WRONG_NUMBERS,
+        *("parallel-boards", "focal-uncertain", "unidentifiable", "rolling-shutter", "half-pixel", "board-warp"),
+        *("baseline-sign", "baseline-scale", "rectified-black", "inverted-transform", "corner-order", "aspect"),
+    ),
+)
+def sides_exchanged(evidence: Evidence) -> Iterator[Finding]:
+    """The check fits every pose of the board to the corners of one camera alone, with its own lens and with that of the
+    other camera. The transform of the pair tells whether the lenses or the pictures are exchanged.
+    """
+    stereo = [pair for pair in evidence.pairs if pair.seen_from_both is not None]
+    if not stereo:
+        raise evidence.without_pair("it needs corners of a board that both cameras of a pair saw")
+    for pair in stereo:
+        yield from _exchanged_sides(pair)
+
+
+def _exchanged_sides(pair: StereoPair) -> Iterator[Finding]:
+    left, right = pair.cameras
+    board, seen, alone = pair.calibration.board, pair.seen_from_both, pair.alone
+    assert board is not None
+    assert seen is not None
+    assert alone is not None
+    corners, names = [seen[pair.left], seen[pair.right]], (pair.left, pair.right)
+    crossed = [lone_poses(camera, board, each) for camera, each in zip((right, left), corners, strict=True)]
+    own, other = (
+        [float(np.nanmedian(corner_errors(*each, board))) for each in zip(cameras, poses, corners, strict=True)]
+        for cameras, poses in (((left, right), alone), ((right, left), crossed))
+    )
+    if not all(ours > EXCHANGED_TIMES * theirs for ours, theirs in zip(own, other, strict=True)):
+        return
+    by_view = crossed[1] * crossed[0].inv()
+    of_lenses = by_view[middlemost(by_view)].translation @ pair.right_from_left.translation > 0
+    what = "camera matrices" if of_lenses else "pictures"
+    sentence = f"{pair.title}: the two {what} are exchanged. With the other camera's lens the corners' error falls" + (
+        ";".join(f" from {a:.2g} to {b:.2g} px ({name})" for name, a, b in zip(names, own, other, strict=True))
+    )
+    keys = "Exchange the two camera matrices, each with its distortion coefficients (M1, D1 and M2, D2)."
+    yield sides_exchanged.found(
+        f"{sentence}.",
+        min(np.divide(own, other)),
+        "times",
+        causes=sides_exchanged.causes[:: 1 if of_lenses else -1],
+        remedy=keys if of_lenses else "Exchange the two folders of pictures, or the corners of the two cameras.",
+    )
+
+
+@sides_exchanged.fault("lenses or pictures exchanged", "", (1, 2), promised=1)
+def lenses_or_pictures(rng: Rng, strength: float) -> Evidence:
+    """The two camera matrices are exchanged (1), or the corners of the two cameras (2)."""
+    solved = healthy_pair(rng)
+    left, right = solved.cameras.values()
+    if strength == 1:
+        lenses = {"left": right.at(left.world_from_cam), "right": left.at(right.world_from_cam)}
+        return Evidence(replace(solved, cameras=lenses, cam_from_board={}))
+    corners = {"left": solved.detections["right"], "right": solved.detections["left"]}
+    return Evidence(replace(solved, detections=corners, cam_from_board={}, set_aside={}))
 
 
 @finding(

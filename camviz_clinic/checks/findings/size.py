@@ -9,7 +9,7 @@ from math import atan, degrees
 
 import numpy as np
 
-from camviz.cameras import Camera
+from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import BrownConrady, Perspective
 from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.registry import WRONG_NUMBERS, Finding, Rng, finding
@@ -26,25 +26,62 @@ ALIKE = 0.06  # how well a clean factor must fit both axes
     "wrong-size",
     severity="fault",
     view="numbers",
-    symptom="cx, cy or f are off by a clean factor.",
-    causes=("a camera matrix for another resolution or crop", "a focal length in millimetres taken for pixels"),
+    symptom="cx, cy or f are off by a clean factor, or fit the image with its sides exchanged.",
+    causes=(
+        "a camera matrix for another resolution or crop",
+        "a focal length in millimetres taken for pixels",
+        "width and height exchanged",
+    ),
     remedy="Rescale the camera matrix to the size of the pictures, c' = s c + (s - 1)/2 and f' = s f, "
     "or give the size it belongs to.",
     threshold="Both axes share a ratio of whole numbers up to 4 within 6 %. "
     "Or a factor against the other calibration is beyond 12 %. "
-    "Or pictures have another size, corners lie outside the image, or the field of view is above 170°.",
+    "Or pictures have another size, corners lie outside the image, or the field of view is above 170°. "
+    "Or the principal point is a tenth of the longer side off the middle, and half of that with exchanged sides.",
     explains=(*WRONG_NUMBERS, "principal-point"),
 )
 def wrong_size(evidence: Evidence) -> list[Finding]:
     """The check holds the camera matrix against the image size, the pictures, the corners and the other calibration."""
     findings = [
+        *(each for name, camera in evidence.cameras.items() for each in _exchanged(name, camera)),
         *_other_pictures(evidence),
         *_corners_outside(evidence),
-        *(each for name, camera in evidence.cameras.items() for each in _clean_factor(name, camera)),
+        *(each for name, camera in evidence.cameras.items() for each in _of_another_size(name, camera)),
         *(each for name, camera in evidence.cameras.items() for each in _too_wide(name, camera)),
         *_other_scale(evidence),
     ]
     return list({finding.camera: finding for finding in reversed(findings)}.values())[::-1]  # the plainest of each
+
+
+def _exchanged(name: str, camera: Camera) -> Iterator[Finding]:
+    """The principal point is off the middle, and near that of the image with width and height exchanged."""
+    grid = camera.intrinsics
+    if sides_exchanged(grid):
+        sentence = (
+            f"{name}: width and height are exchanged. The principal point ({grid.cx:.1f}, {grid.cy:.1f}) fits an image "
+            f"of {grid.height}×{grid.width}, not this one of {grid.width}×{grid.height}."
+        )
+        yield wrong_size.found(
+            sentence,
+            off_centre(grid),
+            "px",
+            name,
+            causes=("an image size written as height and width", "pictures turned by a quarter after the calibration"),
+            remedy=f"Exchange width and height in the file: {grid.height}×{grid.width}. "
+            "If the pictures are turned, turn them back.",
+        )
+
+
+def off_centre(grid: Intrinsics) -> float:
+    """The distance of the principal point from the middle of the image, in pixels."""
+    return float(np.hypot(grid.cx - (grid.width - 1) / 2, grid.cy - (grid.height - 1) / 2))
+
+
+def sides_exchanged(grid: Intrinsics) -> bool:
+    """Whether the principal point is far from the middle, and less than half as far with the sides exchanged."""
+    limit, now = OFF_CENTRE * max(grid.width, grid.height), off_centre(grid)
+    turned = off_centre(replace(grid, width=grid.height, height=grid.width))
+    return now > limit and turned <= min(limit, now / 2)
 
 
 def _other_pictures(evidence: Evidence) -> Iterator[Finding]:
@@ -79,14 +116,19 @@ def _corners_outside(evidence: Evidence) -> Iterator[Finding]:
             yield wrong_size.found(sentence, value, "times", name)
 
 
-def _clean_factor(name: str, camera: Camera) -> Iterator[Finding]:
-    """(cx, cy) the same clean multiple of the middle on both axes: a camera matrix of another resolution."""
-    grid = camera.intrinsics
+def clean_factor(grid: Intrinsics) -> Fraction | None:
+    """The clean multiple of the middle that cx and cy both are: that of another resolution; None where they are not."""
     factors = np.array([(grid.cx + 0.5) / (grid.width / 2), (grid.cy + 0.5) / (grid.height / 2)])
     if not (factors > 0).all() or (abs(factors - 1) < 2 * ALIKE).any():
-        return
+        return None
     clean = min(CLEAN, key=lambda factor: abs(np.log(factors / float(factor))).max())
-    if abs(np.log(factors / float(clean))).max() < ALIKE:
+    return clean if abs(np.log(factors / float(clean))).max() < ALIKE else None
+
+
+def _of_another_size(name: str, camera: Camera) -> Iterator[Finding]:
+    """A camera matrix of another resolution."""
+    grid = camera.intrinsics
+    if clean := clean_factor(grid):
         sentence = (
             f"{name}: the principal point ({grid.cx:.1f}, {grid.cy:.1f}) is the middle of an image of "
             f"{grid.width * clean}×{grid.height * clean}, {clean} times this one's {grid.width}×{grid.height}."
@@ -134,6 +176,14 @@ def resized(rng: Rng, strength: float) -> Evidence:
     return Evidence(alone(changed(solved, fx=large.fx, fy=large.fy, cx=large.cx, cy=large.cy)))
 
 
+@wrong_size.fault("sides exchanged", "", (1,), promised=1)
+def sides_swapped(rng: Rng, strength: float) -> Evidence:
+    """The file has the width for the height, and the height for the width."""
+    solved = healthy(rng)
+    grid = solved.cameras["camera"].intrinsics
+    return Evidence(alone(changed(solved, width=grid.height, height=grid.width)))
+
+
 @wrong_size.fault("resized pictures", "times", (0.5, 1.25, 2), promised=1.25)
 def resized_pictures(rng: Rng, strength: float) -> Evidence:
     """The pictures have another size."""
@@ -152,17 +202,16 @@ def resized_pictures(rng: Rng, strength: float) -> Evidence:
         "a crop that was not applied to the camera matrix",
         "too few tilted views, so that the principal point follows the noise",
     ),
-    remedy="Check whether the pictures were cropped. If not, fix the principal point or add tilted views, "
-    "and solve again.",
+    remedy="If the pictures were cropped, subtract the crop's first pixel from cx and cy. After a crop to one side "
+    "ignore this warning. If they were not, fix the principal point or add tilted views, and solve again.",
     threshold="They are a tenth of the image's longer side apart.",
 )
 def principal_point(evidence: Evidence) -> Iterator[Finding]:
     """The check compares cx and cy with the middle of the image."""
     for name, camera in evidence.cameras.items():
         grid = camera.intrinsics
-        distance = float(np.hypot(grid.cx - (grid.width - 1) / 2, grid.cy - (grid.height - 1) / 2))
-        longer = max(grid.width, grid.height)
-        explained = any(True for _ in _clean_factor(name, camera))  # by wrong-size
+        distance, longer = off_centre(grid), max(grid.width, grid.height)
+        explained = sides_exchanged(grid) or clean_factor(grid) is not None  # by wrong-size
         if distance > OFF_CENTRE * longer and not explained:
             sentence = (
                 f"{name}: the principal point ({grid.cx:.1f}, {grid.cy:.1f}) is {distance:.0f} px from the middle of "

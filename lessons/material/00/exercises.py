@@ -16,7 +16,7 @@ def homogeneous(points: Array) -> Array:
 
 def _cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for shape in SHAPES:
-        for n in (2, 3):
+        for n in (1, 2, 3, int(rng.integers(4, 9))):
             yield (rng.normal(size=(*shape, n)),)
 
 

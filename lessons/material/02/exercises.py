@@ -27,6 +27,7 @@ def _image_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         f = float(rng.uniform(20, 120))
         yield (f, f * rng.uniform(1.2, 60, shape))
     yield (f, f * rng.uniform(0.2, 0.8, 4))  # a magnifying glass
+    yield (f, f * np.array([0.01, 0.99, 1.01, 1.1, 1e3, 1e6]))  # on either side of f, and very far away
     yield (f, np.array([np.inf, 3 * f]))
 
 
@@ -151,8 +152,8 @@ def _view_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for shape in SHAPES:
         f = float(rng.uniform(20, 120))
         yield (float(rng.uniform(8, 50)), f, f * rng.uniform(1.5, 20, shape))
-    yield (36.0, f, np.array([np.inf]))
-    yield (36.0, f, np.array([np.inf, 3 * f]))
+    for s in (np.inf, np.array([np.inf]), f * np.array([np.inf, 1.01, 1.2, 3, 30, 1e3, 1e6])):
+        yield (float(rng.uniform(8, 50)), f, s)
 
 
 VIEW = Exercise(
@@ -384,7 +385,8 @@ def _limit_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for shape in SHAPES:
         f, N, c = (float(rng.uniform(*ends)) for ends in ((20, 100), (2, 16), (0.005, 0.03)))
         yield (f, N, f**2 / (N * c) * rng.uniform(0.1, 0.9, shape), c)
-    yield (f, N, f**2 / (N * c) * np.array([0.4, 1.5, 4.0]), c)
+    yield (f, N, (f**2 / (N * c) + f) * np.array([0.4, 0.92, 0.999, 1.001, 1.1, 1.5, 4.0, 100.0]), c)
+    yield (f, N, f * rng.uniform(1.1, 20, 4), c)
     f, N, c = float(rng.integers(20, 100)), 2.0 ** rng.integers(1, 4), 2.0 ** -rng.integers(5, 8)
     yield (f, N, (f**2 / (N * c) + f) * np.array([0.5, 1.0, 2.0]), c)  # exactly at the hyperfocal distance, too
 
@@ -528,11 +530,6 @@ def c_as_a_radius(f, N, s, c):
 @LIMITS.wrong("This is the near limit alone. Two arrays are wanted: `return near, far`.")
 def near_limit_alone(f, N, s, c):
     return limits(f, N, s, c)[0]
-
-
-@LIMITS.wrong("Both limits have come back in one array. Return them as two: `return near, far`, without `np.array`.")
-def both_in_one_array(f, N, s, c):
-    return np.array(limits(f, N, s, c))
 
 
 @LIMITS.wrong("The condition is the wrong way round: there is a far limit while s < H, and none from H on.")

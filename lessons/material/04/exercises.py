@@ -303,6 +303,13 @@ def _leaning(rng: np.random.Generator, lean: float) -> Array:
     return _rotation(rng) @ np.array([[1, lean, 0], [0, np.sqrt(1 - lean**2), 0], [0, 0, 1]])
 
 
+def _stretched_along_its_axis(rng: np.random.Generator, stretch: float) -> Array:
+    """A rotation about an axis that keeps volumes and stretches the axis: MMᵀ is as far off as MᵀM."""
+    axis = np.eye(3)[rng.integers(3)]
+    turn = Rotation.from_rotvec(rng.uniform(0.5, 3) * axis).as_matrix()
+    return np.asarray(turn @ np.diag(1 - stretch / 2 + 1.5 * stretch * axis))
+
+
 def _is_rotation_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     matrices = _rotations_and_others(rng)
     for index in rng.permutation(len(matrices)):
@@ -321,6 +328,13 @@ def _rotations_and_others(rng: np.random.Generator) -> list[Array]:
         _rotation(rng) @ np.diag([1.2, 1 / 1.2, 1.0]),
         _rotation(rng) @ np.diag([1 + 2.5e-6, 1 - 2.5e-6, 1.0]),  # five times as far off as is allowed
         (1 + 2e-7) * _rotation(rng),  # 4e-7 and 6e-7 off, which is allowed
+        (1 + 3.3e-7) * _rotation(rng),  # the determinant is 0.99e-6 off
+        (1 - 3.3e-7) * _rotation(rng),
+        _stretched_along_its_axis(rng, float(rng.choice([-1, 1])) * 4.95e-7),  # the squares of lengths are 0.99e-6 off
+        _stretched_along_its_axis(rng, 1.02e-6),  # off by more than is allowed in the lengths themselves, too
+        _stretched_along_its_axis(rng, -1.02e-6),
+        np.eye(3) + np.diag([4.95e-7, 0], 1) + np.diag([4.95e-7, 0], -1),
+        np.eye(3) + np.diag([1.02e-6, 0], 1) + np.diag([1.02e-6, 0], -1),
         _leaning(rng, float(rng.uniform(2e-7, 4e-7))),  # as single precision leaves a rotation
         _leaning(rng, float(rng.uniform(6e-6, 9e-6))),
         _leaning(rng, -float(rng.uniform(6e-6, 9e-6))),

@@ -217,7 +217,7 @@ class BoardPictures(View):
 
     @cached_property
     def residuals(self) -> Array:
-        """Found less projected corners, (views, n, 2) in pixels; NaN where a corner was not seen."""
+        """Detected less projected corners, (views, n, 2) in pixels; NaN where a corner was not seen."""
         assert self.camera
         return self.corners - self.camera.project(transform_each(self.estimated_poses, self.board.corners))
 

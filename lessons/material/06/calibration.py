@@ -243,15 +243,15 @@ class CalibrationView(OrbitView, EstimateNumbers):
         return float(_MAGNIFIED[np.abs(np.log(_MAGNIFIED * max(typical, 1e-3) / 9)).argmin()])
 
     def _vectors(self, panel: Panel) -> Marks:
-        """The residuals, magnified, from where the estimated camera would see a corner towards where it was found."""
+        """The residuals, magnified, from where the estimated camera projects a corner towards where it was detected."""
         if self.adjustment is None:
             return NOTHING
-        residuals, found = self.residuals, self.corners
-        starts, ends = panel.place(found), panel.place(found + self.magnified * residuals)
+        projected = self.corners - self.residuals
+        starts, ends = panel.place(projected), panel.place(projected + self.magnified * self.residuals)
         others = np.arange(self.count) != self.index
-        faint = svg.NOTHING if self.photographs else svg.segments(starts[others], ends[others], "red thin half")
-        here = svg.dots(starts[self.index], "orange", 4) + svg.segments(starts[self.index], ends[self.index], "red")
-        return faint + here
+        faint = NOTHING if self.photographs else svg.segments(starts[others], ends[others], "red thin half")
+        dots = svg.dots(panel.place(self.corners[self.index]), "orange", 4)
+        return faint + dots + svg.segments(starts[self.index], ends[self.index], "red")
 
     @property
     def _grips(self) -> Array:

@@ -48,8 +48,7 @@ def constraints(H: ArrayLike) -> Array:
 def camera_matrix(homographies: Sequence[ArrayLike], skew: bool = False) -> Array:
     """The one camera matrix behind all these homographies, in closed form and without distortion.
 
-    Boards that are parallel count as one. Two that are tilted about the same row or column, or that mirror each other,
-    leave K undetermined.
+    Parallel boards count as one. Two that tilt about the same row or column, or mirror each other, do not determine K.
 
     Args:
         homographies: sequence of (3, 3), from the board's plane in metres to pixels: at least two, or three where skew

@@ -659,6 +659,16 @@ def _left_right_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     yield left, right, tolerance
     yield _each_column_by_itself(rng, 50)
     yield from _whole_disparities_of_either_sign(rng)
+    yield _partners_that_rounding_decides(rng, 120)
+
+
+def _partners_that_rounding_decides(rng: np.random.Generator, n: int) -> Arguments:
+    """Partners within half a column of the first and of the last one, on either side of it."""
+    left, right = rng.uniform(-0.45, 0.45, (2, n))
+    left[[0, 1, -2, -1]] = rng.uniform(0.1, 0.4), 1 + rng.uniform(0.6, 0.9), -1 - rng.uniform(0.6, 0.9), -0.3
+    right[[0, -1]] = left[[0, -1]]
+    right[4:8] = left[4:8] + [2.99, -2.99, 3.01, -3.01]  # near the tolerance, on either side
+    return left, right, 3.0
 
 
 def _whole_disparities_of_either_sign(rng: np.random.Generator) -> Iterator[Arguments]:
@@ -867,6 +877,9 @@ def _between_cases(rng: np.random.Generator) -> Iterator[Arguments]:
             after.flat[3] = best.flat[3] - rng.uniform(0.1, 5)
             before.flat[4] = after.flat[4] = best.flat[4]
             before.flat[5] = after.flat[5] = best.flat[5] - rng.uniform(1, 5)
+        if best.size > 7:
+            best.flat[6:8] = rng.uniform(30, 80, 2)
+            before.flat[6], after.flat[7] = 0.995 * best.flat[6:8]  # a little lower than the best
         yield before, best, after
 
 

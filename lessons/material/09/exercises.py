@@ -571,7 +571,8 @@ COEFFICIENTS = Exercise(
     name="09.coefficients",
     reference=coefficients,
     cases=_lens_cases,
-    tolerance=1e-6,
+    any_numbers=False,
+    tolerance=5e-5,  # an iteration, such as scipy's curve_fit, is good enough
     shown=((np.array([0.2, 0.5, 0.8, 1.1, 1.4]), 2 * np.tan(np.array([0.2, 0.5, 0.8, 1.1, 1.4]) / 2)),),
     hints=(
         "Multiply the bracket out. What does each k stand beside? And which part of r needs no k at all?",

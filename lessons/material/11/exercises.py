@@ -429,6 +429,7 @@ SLOPE = Exercise(
     name="11.slope",
     reference=slope,
     cases=_slice_cases,
+    any_numbers=False,
     tolerance=0.02,  # differences of neighbours are not quite derivatives, and there is noise in them
     hints=(
         "L(x, u) = g(x + d u). Differentiate by u and by x and compare: which multiple of L_x is L_u?",

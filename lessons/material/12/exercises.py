@@ -525,6 +525,7 @@ def _frequency_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for shape in SHAPES:
         yield (rng.uniform(0.05, 0.95, shape),)
     yield (rng.uniform(1.05, 2.95, 6),)
+    yield (rng.uniform(3, 40, 12),)
     yield (np.array([0.0, 0.25, 0.3, 0.5, 0.7, 0.9, 1.0, 1.4, 1.5, 2.0, 2.2, 2.5]),)
 
 
@@ -556,7 +557,7 @@ def from_a_cosine(f):
 
 @FALSE_FREQUENCY.right
 def the_nearest_of_a_list(f):
-    return np.min(np.abs(np.asarray(f)[..., None] - np.arange(-0.5, 5)), axis=-1)
+    return np.min(np.abs(np.asarray(f)[..., None] - np.arange(-0.5, 50)), axis=-1)
 
 
 @FALSE_FREQUENCY.right
@@ -709,6 +710,9 @@ def _edge_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     draw[..., :, 2] = 2 * draw[..., 2, 2, None] - draw[..., 2, :]  # upside down, the column changes as much as the row
     yield (draw,)
     yield (draw - 4,)
+    nearly = draw.copy()
+    nearly[..., :, 2] += rng.choice([-0.004, 0.004], (6, 1)) * (draw[..., :, 2] - draw[..., 2, 2, None])
+    yield (nearly,)
 
 
 EDGE_GREEN = Exercise(

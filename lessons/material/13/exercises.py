@@ -299,7 +299,7 @@ DEVELOP = Exercise(
 def by_opencv_s_transform(raw, gains, matrix):
     import cv2
 
-    linear = cv2.transform(np.reshape(raw * gains, (-1, 1, 3)), matrix).reshape(raw.shape)
+    linear = cv2.transform(np.reshape(raw * gains, (-1, 1, 3)).astype(float), matrix).reshape(raw.shape)
     return np.power(np.minimum(np.maximum(linear, 0), 1), 1 / 2.2)
 
 

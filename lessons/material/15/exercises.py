@@ -272,6 +272,8 @@ def _flat_cases(rng: np.random.Generator) -> Iterator[Arguments]:
         if shape == (6, 6):
             dead, deader = rng.choice(36, 2, replace=False)
             response.flat[dead], response.flat[deader] = 0, -0.01  # the second's flat is even below its dark
+        if shape == (7, 5):
+            response[2] = [0.5, 0.1, 0.02, 0.005, 0.001]  # weak pixels, which are not dead
         yield (dark + light * response, dark, dark + rng.uniform(300, 600) * response)
 
 

@@ -40,8 +40,8 @@ class FaultLabView(ViewChooser):
     """What a fault does to a calibration, and what it does not: the fit, the estimates against the truth, the findings.
 
     Strength 0 is a healthy calibration. The corners have Gaussian noise of `noise` pixels; `seed` chooses camera,
-    boards and noise. Arrows lead from a detected corner of the chosen view to its projection. A click on a bar
-    chooses its view.
+    boards and noise. Arrows lead from where the camera projects a corner of the chosen view
+    towards where it was detected. A click on a bar chooses its view.
 
     `panels` names what is drawn: any of residuals, bars, numbers, estimates and findings. `yours` is a reader's
     function of residuals (views, corners, 2) to the RMS (views,) of every view, and `verdict` one of residuals (views,
@@ -194,13 +194,14 @@ class FaultLabView(ViewChooser):
         k = made.camera.intrinsics
         panel = image_in(self._layout["residuals"], "picture", k.width, k.height)
         seen, residuals, scale = made.solved.detections["camera"][i], made.residuals[i], self.arrow_scale
-        starts = panel.place(seen)
-        ends, cut = shortened(starts, panel.place(seen - scale * residuals), _LONGEST)
-        grid = panel.place(seen - residuals).reshape(BOARD.rows, BOARD.columns, 2)
+        projected = seen - residuals
+        starts = panel.place(projected)
+        ends, cut = shortened(starts, panel.place(projected + scale * residuals), _LONGEST)
+        grid = starts.reshape(BOARD.rows, BOARD.columns, 2)
         content = svg.path([*grid, *grid.swapaxes(0, 1)], "muted thin")
         content += arrows(starts[~cut], ends[~cut], "orange") + arrows(starts[cut], ends[cut], "red")
-        content += svg.dots(starts, "green", 3.5)
-        note = "red: longer than drawn" if cut.any() else "from detected to projected"
+        content += svg.dots(panel.place(seen), "green", 3.5)
+        note = "red: longer than drawn" if cut.any() else "from projected to detected"
         return panel.show(content, title=f"View {i + 1}: residuals × {scale:g}", note=note)
 
     @property

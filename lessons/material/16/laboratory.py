@@ -72,7 +72,7 @@ class Experiment:
 
     @cached_property
     def residuals(self) -> Array:
-        """Observed less projected, in pixels (views, corners, 2)."""
+        """Detected less projected, in pixels (views, corners, 2)."""
         return self.solved.residuals["camera"]
 
     @cached_property

@@ -169,7 +169,7 @@ def _spreads(rng: np.random.Generator) -> Iterator[Arguments]:
         yield light, step, rng.uniform(0.1, 0.5, shape)
     x = np.linspace(-2.2, 1.8, 20)
     sharpened = np.exp(-3 * x**2) - rng.uniform(0.25, 0.35) * (np.exp(-4 * (x - 1) ** 2) + np.exp(-4 * (x + 1) ** 2))
-    yield rng.uniform(2, 5) * sharpened, 0.2, np.array([0.0, 0.1, 0.2, 0.3, 0.45, 0.9])  # above 1 in the middle
+    yield rng.uniform(2, 5) * sharpened, 0.2, np.array([0.0, 0.1, 0.2, 0.3, 0.45, 0.9, 1.0])  # above 1 in the middle
     box = float(rng.uniform(1, 3))  # a pixel's own spread, of which nothing is left at 1 cycle per pixel
     yield np.full(8, box), 0.125, np.array([[0.0, 0.5], [1.0, 2.0]])
 
@@ -920,7 +920,7 @@ VEIL = Exercise(
 
 @VEIL.right
 def colour_by_colour(recorded, glare):
-    out = np.empty_like(recorded)
+    out = np.empty(recorded.shape)
     for channel in range(3):
         one = recorded[..., channel]
         out[..., channel] = (one - glare * one.mean()) / (1 - glare)

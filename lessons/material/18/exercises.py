@@ -11,6 +11,8 @@ import cv2
 import numpy as np
 
 from camviz_school.course.checks import SHAPES, Arguments, Array, Exercise
+from camviz_school.course.laws import error_ratio, unused_row
+from camviz_school.course.trials import Function
 
 NOWHERE = np.full(2, np.nan)
 
@@ -239,7 +241,7 @@ def columns_alone(first, second, centre):
     return np.sqrt(np.where(product > 0, product, np.nan))
 
 
-@FOCAL_LENGTH.wrong("This is half the distance between the points: right only where the corner is in the middle.")
+@FOCAL_LENGTH.wrong("This is half the distance of the points: right only in a level picture of walls both seen at 45°.")
 def half_the_distance(first, second, centre):
     half = np.linalg.norm(first - second, axis=-1) / 2
     return np.where(np.sum((first - centre) * (second - centre), axis=-1) < 0, half, np.nan)
@@ -416,6 +418,7 @@ ANY_HEIGHT = Exercise(
     name="18.any_height",
     reference=any_height,
     cases=_tilted,
+    any_numbers=False,
     hints=(
         "The equation gives camera heights up to a factor that is the same for staff and door. What do you divide?",
         "Write the right side as a function of one foot and top, each with a third number 1. Call it twice.",
@@ -543,12 +546,12 @@ PRINCIPAL_POINT = Exercise(
         "(a − p) · (b − c) = 0 says (b − c) · p = (b − c) · a. A second corner gives a second row: solve both for p.",
         "`return np.linalg.solve(sides, [(b - c) @ a, ___])`, where `sides` has the rows b − c and c − a",
     ),
-    praise="It is where the three heights of the triangle cross.",
+    praise="It is the orthocentre: there the three altitudes of the triangle meet.",
 )
 
 
 @PRINCIPAL_POINT.right
-def by_crossing_two_heights(a, b, c):
+def by_crossing_two_altitudes(a, b, c):
     def upright(corner, one, other):
         along = one - other
         return np.array([along[0], along[1], -(along @ corner)])
@@ -570,13 +573,13 @@ def by_the_circumcentre(a, b, c):
     return a + b + c - 2 * middle
 
 
-@PRINCIPAL_POINT.wrong("This is the mean of the three corners. The principal point is where the *heights* cross.")
+@PRINCIPAL_POINT.wrong("This is the mean of the three corners. The principal point is where the *altitudes* meet.")
 def centroid(a, b, c):
     return (a + b + c) / 3
 
 
 @PRINCIPAL_POINT.wrong(
-    "This is the middle of the circle through the corners. The principal point is where the heights cross."
+    "This is the middle of the circle through the corners. The principal point is where the altitudes meet."
 )
 def circumcentre(a, b, c):
     A = 2 * np.array([b - a, c - a])
@@ -584,7 +587,7 @@ def circumcentre(a, b, c):
 
 
 @PRINCIPAL_POINT.wrong(
-    "This is the middle of the circle inside the triangle, where the angles' halves cross. Take the heights."
+    "This is the middle of the circle inside the triangle, where the angles' halves meet. Take the altitudes."
 )
 def incentre(a, b, c):
     sides = np.array([np.linalg.norm(b - c), np.linalg.norm(c - a), np.linalg.norm(a - b)])
@@ -596,23 +599,23 @@ def wrong_corner(a, b, c):
     return np.linalg.solve(np.array([b - c, c - a]), [(b - c) @ a, (c - a) @ c])
 
 
-@PRINCIPAL_POINT.wrong("You use the side that begins at the corner. The height stands on the side *opposite*.")
+@PRINCIPAL_POINT.wrong("You use the side that begins at the corner. The altitude stands on the side *opposite*.")
 def adjacent_side(a, b, c):
     return np.linalg.solve(np.array([a - b, b - c]), [(a - b) @ a, (b - c) @ b])
 
 
-@PRINCIPAL_POINT.wrong("Below the right sides stands one corner twice. Each height has a corner of its own.")
+@PRINCIPAL_POINT.wrong("Below the right sides stands one corner twice. Each altitude has a corner of its own.")
 def one_corner_twice(a, b, c):
     return np.linalg.solve(np.array([b - c, c - a]), [(b - c) @ a, (c - a) @ a])
 
 
-@PRINCIPAL_POINT.wrong("This is the foot of one height, on the side opposite a. The heights cross farther on.")
-def foot_of_a_height(a, b, c):
+@PRINCIPAL_POINT.wrong("This is the foot of one altitude, on the side opposite a. The altitudes meet farther on.")
+def foot_of_an_altitude(a, b, c):
     along = c - b
     return b + along * ((a - b) @ along) / (along @ along)
 
 
-@PRINCIPAL_POINT.wrong("This is the middle of one side. The principal point lies on the heights of the triangle.")
+@PRINCIPAL_POINT.wrong("This is the middle of one side. The principal point lies on the altitudes of the triangle.")
 def middle_of_a_side(a, b, c):
     return (a + b) / 2
 
@@ -630,13 +633,35 @@ def camera_matrix(points: Array, pixels: Array) -> Array:
 
 
 def _six_points(rng: np.random.Generator) -> Iterator[Arguments]:
-    for n in (6, 6, 9, 20):
+    return _cameras(rng, 6, 6, 9, 20)
+
+
+def _cameras(rng: np.random.Generator, *numbers: int) -> Iterator[Arguments]:
+    for n in numbers:
         K, R, _ = _camera(rng)
         K[:2, 2] -= 1500 if n == 9 else 0  # cropped
         K[0, 1], K[1, 1] = rng.uniform(-20, 20), K[1, 1] * rng.uniform(0.8, 1.2)
         points = rng.uniform(-2, 2, (n, 3))
         x = (points - R.T @ [0.3, -0.4, -6.0] * rng.uniform(0.8, 1.2)) @ (K @ R).T
         yield points, x[:, :2] / x[:, 2:]
+
+
+def _all_points_count(function: Function, rng: np.random.Generator) -> str:
+    """With noise every point counts, and the error is that of all points."""
+    true = [next(_cameras(rng, 20)) for _ in range(8)]
+    noisy = [(points, pixels + rng.normal(0, 0.5, pixels.shape)) for points, pixels in true]
+    unused = unused_row(function, noisy[0], _up_to_scale)
+    if unused is not None:
+        return f"Your P does not change when pixel {unused} of 20 moves. With noise every point is needed."
+    ratio = error_ratio(function, camera_matrix, noisy, lambda P, number: _pixel_error(P, *true[number]))
+    return (
+        "" if ratio < 2 else f"Your P is right for exact pixels. With noise its error is {ratio:.1f} times that of all."
+    )
+
+
+def _pixel_error(P: Array, points: Array, pixels: Array) -> float:
+    x = np.column_stack([points, np.ones(len(points))]) @ P.T
+    return float(np.sqrt(np.mean((x[:, :2] / x[:, 2:] - pixels) ** 2)))
 
 
 def _up_to_scale(P: Array) -> Array:
@@ -650,8 +675,10 @@ CAMERA_MATRIX = Exercise(
     name="18.camera_matrix",
     reference=camera_matrix,
     cases=_six_points,
+    any_numbers=False,
     tolerance=1e-6,
     canonical=_up_to_scale,
+    laws=(_all_points_count,),
     hints=(
         "Each point gives two rows of twelve numbers. The twelve numbers of P make all rows 0.",
         "Stack the rows (X, 0, −uX) and (0, X, −vX), X with its 1. `np.linalg.svd(A)[2][-1]` is the unit vector that "

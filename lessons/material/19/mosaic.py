@@ -200,7 +200,7 @@ class MosaicView(View):
         return panel.show(content, title=f"Both pictures, joined by {'your' if self.yours else 'one'} H")
 
     def _marks(self, panel: Panel) -> Marks:
-        """A dot where the first picture has a match, and a line to where the second one's pixel comes to lie."""
+        """A dot where the first picture has a match, and a line to it from where H takes the second one's pixel."""
         uv, to = self.matches
         ends = np.stack([panel.place(to), panel.place(warped(self.shown_H[0], uv))], axis=1)
         far = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1) > 1.5

@@ -94,14 +94,14 @@ class ThreeViews(OrbitView):
         return (RigidTransform.identity(), first, step * first), transform(first.inv(), self.given[0])
 
     @cached_property
-    def errors(self) -> Array:
-        """Where (3, n, 2) the model's points appear less where they were seen, in pixels."""
+    def residuals(self) -> Array:
+        """Where (3, n, 2) the points were detected less where the model projects them, in pixels."""
         poses, points = self.model
-        return np.stack([CAMERA.at(pose.inv()).project(points) for pose in poses]) - true_scene().seen
+        return true_scene().seen - np.stack([CAMERA.at(pose.inv()).project(points) for pose in poses])
 
     def numbers(self) -> dict[str, str]:
         """The state's key figures, as text."""
-        each = np.sqrt(np.mean(np.sum(self.errors**2, axis=-1), axis=-1))
+        each = np.sqrt(np.mean(np.sum(self.residuals**2, axis=-1), axis=-1))
         steps = np.linalg.norm(np.diff([pose.inv().translation for pose in self.model[0]], axis=0), axis=-1)
         found = {f"error in picture {i}": f"{one:.2f} px" for i, one in enumerate(each, 1)}
         found["second step / first"] = f"{steps[1] / steps[0]:.3f}"
@@ -135,7 +135,7 @@ class ThreeViews(OrbitView):
         """Rings where the third picture has the points, and crosses where the chain of two pairs expects them."""
         panel = image_panel("third", 10, 34, self._layout["picture"][2] - 20, 640, 480)
         at = panel.place(true_scene().seen[2])
-        ends = at + panel.scale * self.errors[2]
+        ends = at - panel.scale * self.residuals[2]
         colour = "muted" if self._waits else "orange" if self.yours is not None else "red"
         marks = on_photograph(np.stack([at, ends], axis=1), f"{colour} thin") + cross(ends, colour, 4)
         content = placed_image(panel, "third", 640, 480) + svg.join(ring(one, "green", 6) for one in at) + marks
