@@ -400,7 +400,7 @@ def test_shapes_are_those_of_the_functions(says):
     assert np.cross(x, z).shape == (line.value,)
     assert vertical.shape == (upright.value,)
     assert view.staff[0].shape == (foot.value,)
-    (middle,) = says("Return p (2,) from the three vanishing points")
+    (middle,) = says("Return c (2,) from the three vanishing points")
     (corner,) = says("from the three vanishing points `a`, `b` and `c` (2,).")
     triangle = np.array([[0.0, 0], [5, 1], [2, 4]])[:, : int(corner.value)]
     assert exercise("18.principal_point").reference(*triangle).shape == (middle.value,)

@@ -207,7 +207,7 @@ def squared(first, second, centre):
     return np.where(product > 0, product, np.nan)
 
 
-@FOCAL_LENGTH.wrong("You count from the corner of the picture. Both arrows begin at the principal point.")
+@FOCAL_LENGTH.wrong("You count from the first pixel. Both arrows begin at the principal point.")
 def from_the_corner(first, second, centre):
     return focal_length(first, second, 0 * centre)
 
@@ -516,10 +516,10 @@ def _measured(door_height, thing, door, rule):
 # 5: the principal point -----------------------------------------------------------------------------------------------
 
 
-def principal_point(a: Array, b: Array, c: Array) -> Array:
-    """The orthocentre (2,) of the triangle of three vanishing points: a − p stands on b − c, and b − p on c − a."""
-    sides = np.array([b - c, c - a])
-    return np.linalg.solve(sides, [(b - c) @ a, (c - a) @ b])
+def principal_point(q1: Array, q2: Array, q3: Array) -> Array:
+    """The orthocentre (2,) of the triangle of vanishing points: q1 − c stands on q2 − q3, and q2 − c on q3 − q1."""
+    sides = np.array([q2 - q3, q3 - q1])
+    return np.linalg.solve(sides, [(q2 - q3) @ q1, (q3 - q1) @ q2])
 
 
 def _triangles(rng: np.random.Generator) -> Iterator[Arguments]:
@@ -531,9 +531,9 @@ def _triangles(rng: np.random.Generator) -> Iterator[Arguments]:
         roll = np.radians(rng.uniform(5, 25))
         turn = np.array([[np.cos(roll), -np.sin(roll), 0], [np.sin(roll), np.cos(roll), 0], [0, 0, 1]])
         x = K @ turn @ tilt @ R
-        a, b, c = (x[:2] / x[2]).T
-        yield a, b, c
-    yield a, c, b  # so that b - c has both signs
+        q1, q2, q3 = (x[:2] / x[2]).T
+        yield q1, q2, q3
+    yield q1, q3, q2  # so that b - c has both signs
 
 
 PRINCIPAL_POINT = Exercise(
@@ -542,82 +542,82 @@ PRINCIPAL_POINT = Exercise(
     cases=_triangles,
     tolerance=1e-7,
     hints=(
-        "The line from one corner through p stands at a right angle on the side opposite. Two such lines fix p.",
-        "(a − p) · (b − c) = 0 says (b − c) · p = (b − c) · a. A second corner gives a second row: solve both for p.",
-        "`return np.linalg.solve(sides, [(b - c) @ a, ___])`, where `sides` has the rows b − c and c − a",
+        "The line from one corner through the principal point stands at a right angle on the side opposite. Two such lines fix it.",
+        "(q1 − c) · (q2 − q3) = 0 says (q2 − q3) · c = (q2 − q3) · q1. A second corner gives a second row: solve both for c.",
+        "`return np.linalg.solve(sides, [(q2 - q3) @ q1, ___])`, where `sides` has the rows q2 − q3 and q3 − q1",
     ),
     praise="It is the orthocentre: there the three altitudes of the triangle meet.",
 )
 
 
 @PRINCIPAL_POINT.right
-def by_crossing_two_altitudes(a, b, c):
+def by_crossing_two_altitudes(q1, q2, q3):
     def upright(corner, one, other):
         along = one - other
         return np.array([along[0], along[1], -(along @ corner)])
 
-    x, y, w = np.cross(upright(a, b, c), upright(b, c, a))
+    x, y, w = np.cross(upright(q1, q2, q3), upright(q2, q3, q1))
     return np.array([x / w, y / w])
 
 
 @PRINCIPAL_POINT.right
-def by_least_squares_of_three(a, b, c):
-    sides = np.array([b - c, c - a, a - b])
-    return np.linalg.lstsq(sides, np.sum(sides * [a, b, c], axis=1), rcond=None)[0].tolist()
+def by_least_squares_of_three(q1, q2, q3):
+    sides = np.array([q2 - q3, q3 - q1, q1 - q2])
+    return np.linalg.lstsq(sides, np.sum(sides * [q1, q2, q3], axis=1), rcond=None)[0].tolist()
 
 
 @PRINCIPAL_POINT.right
-def by_the_circumcentre(a, b, c):
-    A = 2 * np.array([b - a, c - a])
-    middle = np.linalg.solve(A, [b @ b - a @ a, c @ c - a @ a])
-    return a + b + c - 2 * middle
+def by_the_circumcentre(q1, q2, q3):
+    A = 2 * np.array([q2 - q1, q3 - q1])
+    middle = np.linalg.solve(A, [q2 @ q2 - q1 @ q1, q3 @ q3 - q1 @ q1])
+    return q1 + q2 + q3 - 2 * middle
 
 
 @PRINCIPAL_POINT.wrong("This is the mean of the three corners. The principal point is where the *altitudes* meet.")
-def centroid(a, b, c):
-    return (a + b + c) / 3
+def centroid(q1, q2, q3):
+    return (q1 + q2 + q3) / 3
 
 
 @PRINCIPAL_POINT.wrong(
     "This is the middle of the circle through the corners. The principal point is where the altitudes meet."
 )
-def circumcentre(a, b, c):
-    A = 2 * np.array([b - a, c - a])
-    return np.linalg.solve(A, [b @ b - a @ a, c @ c - a @ a])
+def circumcentre(q1, q2, q3):
+    A = 2 * np.array([q2 - q1, q3 - q1])
+    return np.linalg.solve(A, [q2 @ q2 - q1 @ q1, q3 @ q3 - q1 @ q1])
 
 
 @PRINCIPAL_POINT.wrong(
     "This is the middle of the circle inside the triangle, where the angles' halves meet. Take the altitudes."
 )
-def incentre(a, b, c):
-    sides = np.array([np.linalg.norm(b - c), np.linalg.norm(c - a), np.linalg.norm(a - b)])
-    return sides @ np.array([a, b, c]) / sides.sum()
+def incentre(q1, q2, q3):
+    sides = np.array([np.linalg.norm(q2 - q3), np.linalg.norm(q3 - q1), np.linalg.norm(q1 - q2)])
+    return sides @ np.array([q1, q2, q3]) / sides.sum()
 
 
-@PRINCIPAL_POINT.wrong("Your second row belongs to the wrong corner: c − a is opposite b.")
-def wrong_corner(a, b, c):
-    return np.linalg.solve(np.array([b - c, c - a]), [(b - c) @ a, (c - a) @ c])
+@PRINCIPAL_POINT.wrong("Your second row belongs to the wrong corner: q3 − q1 is opposite q2.")
+def wrong_corner(q1, q2, q3):
+    return np.linalg.solve(np.array([q2 - q3, q3 - q1]), [(q2 - q3) @ q1, (q3 - q1) @ q3])
 
 
 @PRINCIPAL_POINT.wrong("You use the side that begins at the corner. The altitude stands on the side *opposite*.")
-def adjacent_side(a, b, c):
-    return np.linalg.solve(np.array([a - b, b - c]), [(a - b) @ a, (b - c) @ b])
+def adjacent_side(q1, q2, q3):
+    return np.linalg.solve(np.array([q1 - q2, q2 - q3]), [(q1 - q2) @ q1, (q2 - q3) @ q2])
 
 
 @PRINCIPAL_POINT.wrong("Below the right sides stands one corner twice. Each altitude has a corner of its own.")
-def one_corner_twice(a, b, c):
-    return np.linalg.solve(np.array([b - c, c - a]), [(b - c) @ a, (c - a) @ a])
+def one_corner_twice(q1, q2, q3):
+    return np.linalg.solve(np.array([q2 - q3, q3 - q1]), [(q2 - q3) @ q1, (q3 - q1) @ q1])
 
 
-@PRINCIPAL_POINT.wrong("This is the foot of one altitude, on the side opposite a. The altitudes meet farther on.")
-def foot_of_an_altitude(a, b, c):
-    along = c - b
-    return b + along * ((a - b) @ along) / (along @ along)
+@PRINCIPAL_POINT.wrong("This is the foot of one altitude, on the side opposite q1. The altitudes meet farther on.")
+def foot_of_an_altitude(q1, q2, q3):
+    along = q3 - q2
+    return q2 + along * ((q1 - q2) @ along) / (along @ along)
 
 
 @PRINCIPAL_POINT.wrong("This is the middle of one side. The principal point lies on the altitudes of the triangle.")
-def middle_of_a_side(a, b, c):
-    return (a + b) / 2
+def middle_of_a_side(q1, q2, q3):
+    return (q1 + q2) / 2
 
 
 # 6: the camera from points --------------------------------------------------------------------------------------------
