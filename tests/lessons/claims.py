@@ -1,9 +1,8 @@
-"""What a lesson states, so that a test can quote a sentence and recompute its number.
+"""What a lesson states: a test quotes a sentence and recomputes its number, to half of its last printed digit.
 
-def test_the_fold():
-    says = claims("05")
-    says("For k1 = −0.3 the fold is at r = 1.054")
-    assert 1 / np.sqrt(3 * 0.3) == approx(1.054, abs=5e-4)  # half of the last printed digit
+says = claims("05")
+says("For k1 = −0.3 this is 1/√0.9 = **1.054**")
+assert 1 / np.sqrt(3 * 0.3) == approx(1.054, abs=5e-4)
 """
 
 from collections.abc import Callable, Iterator
@@ -12,11 +11,12 @@ from functools import cache
 from camviz_school.course import glossary, material, notebooks, questions
 
 
-def claims(number: str) -> Callable[[str], None]:
-    """Return `says(sentence)`, which asserts that the sentence stands in the lesson ("05") of that number."""
+def claims(number: str) -> Callable[..., None]:
+    """Return `says(*sentences)`, which asserts that each sentence stands in the lesson ("05") of that number."""
 
-    def says(sentence: str) -> None:
-        assert any(_plain(sentence) in text for text in _texts(number)), f"lesson {number} does not say {sentence!r}"
+    def says(*sentences: str) -> None:
+        for sentence in map(_plain, sentences):
+            assert any(sentence in text for text in _texts(number)), f"lesson {number} does not say {sentence!r}"
 
     return says
 
@@ -33,7 +33,7 @@ def _texts(number: str) -> tuple[str, ...]:
 
 def _passages(number: str) -> Iterator[str]:
     """Yield the lesson's Markdown cells, its questions with choices and replies, and its terms of the glossary."""
-    (path,) = (path for path in material.lesson_paths() if path.name.startswith(number))
+    (path,) = material.lessons_folder().glob(f"{number}_*.ipynb")
     yield from (cell.source for cell in notebooks.read(path).cells if cell.cell_type == "markdown")
     for one in questions.questions(number).values():
         yield from (one.text, *(text for choice in one.choices for text in (choice.text, choice.reply)))
