@@ -21,8 +21,7 @@ def claims(number: str) -> Callable[..., None]:
     return says
 
 
-def _plain(text: str) -> str:
-    """Return the text on one line, without the asterisks of emphasis."""
+def _plain(text: str) -> str:  # on one line, without the asterisks of emphasis
     return " ".join(text.replace("*", "").split())
 
 
