@@ -7,9 +7,11 @@ from scipy.optimize import brentq
 from scipy.special import jn_zeros
 
 from camviz import optics
+from camviz_school.course.material import module
 from camviz_school.views.depth_of_field import DepthOfFieldView
 
 says = claims("02")
+lesson02 = module("02")
 
 AIRY = 2 * jn_zeros(1, 1)[0] / np.pi
 """The diameter of the first dark ring in λ v / D, from the first zero of J1."""
@@ -164,6 +166,22 @@ def test_covering_half_the_lens_takes_nothing_away():
     whole, half = (v.image(64).astype(float) for v in (view, view.but(covered="left half")))
     blocks = [one.reshape(12, 20, 16, 20, 3).mean(axis=(1, 3, 4)) for one in (whole, half)]
     assert 0.55 < (blocks[1] / blocks[0]).min() < (blocks[1] / blocks[0]).max() < 1  # bytes: half the light is 0.73
+
+
+def test_the_exercises_answers_are_camviz_s():
+    rng = np.random.default_rng(5)
+    for f, u in lesson02.IMAGE.cases(rng):
+        np.testing.assert_allclose(lesson02.image_distance(f, u), optics.image_distance_mm(f, u))
+    for width, f, s in lesson02.VIEW.cases(rng):
+        wanted = optics.field_of_view_deg(width, optics.image_distance_mm(f, s))
+        np.testing.assert_allclose(np.degrees(lesson02.field_of_view(width, f, s)), wanted)
+    for f, N, s, u in lesson02.BLUR.cases(rng):
+        np.testing.assert_allclose(lesson02.blur(f, N, s, u), optics.circle_of_confusion_mm(f, N, s, u), atol=1e-12)
+    for f, N, s, c in lesson02.LIMITS.cases(rng):
+        wanted = optics.near_limit_mm(f, N, s, c), optics.far_limit_mm(f, N, s, c)
+        np.testing.assert_allclose(lesson02.limits(f, N, s, c), wanted)
+    for (rows,) in lesson02.ELEMENTS.cases(rng):
+        assert lesson02.effective_focal_length(rows) == pytest.approx(-1 / through(rows)[1, 0])
 
 
 # The numbers of the questions ----------------------------------------------------------------------------------------

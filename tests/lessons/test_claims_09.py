@@ -60,9 +60,7 @@ def area(name, theta):
 
 
 def test_the_five_projections_and_what_each_keeps():
-    says(
-        "| f tan θ | straight lines | ∞ | below 90° |", "| equidistant | f θ | angles from the axis | 1.571 f | 180° |"
-    )
+    says("| f tan θ | straight lines | ∞ | below 90° |", "| equidistant | f θ | angles from the axis | 1.571 f |")
     says("| shapes: circles stay circles | 2 f | below 180° |", "| areas | 1.414 f | 180° |")
     at_90 = [RADIUS[name](np.pi / 2) for name in ("equidistant", "stereographic", "equisolid", "orthographic")]
     assert at_90 == pytest.approx([1.571, 2, 1.414, 1], abs=5e-4)
