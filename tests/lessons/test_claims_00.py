@@ -52,16 +52,6 @@ def test_hand_eye_needs_two_axes_that_are_not_parallel():
     assert solutions([0, 0, 0.5], [0.4, 0, 0]) == 1  # X alone, up to its scale
 
 
-def test_one_matrix_unmixes_the_eye_s_curves():
-    says("One matrix then turns its counts into tristimulus values exactly, whatever the spectrum.")
-    rng = np.random.default_rng(1)
-    eye, mixing, spectra = rng.uniform(0, 1, (81, 3)), rng.normal(size=(3, 3)), rng.uniform(0, 1, (500, 81))
-    np.testing.assert_allclose(spectra @ (eye @ mixing) @ np.linalg.inv(mixing), spectra @ eye, rtol=1e-9)
-    other = eye @ mixing + 0.1 * rng.uniform(0, 1, (81, 3))  # no mixtures of the eye's curves
-    best = np.linalg.lstsq(spectra @ other, spectra @ eye, rcond=None)[0]
-    assert np.abs(spectra @ other @ best / (spectra @ eye) - 1).max() > 1e-3
-
-
 def test_files_give_rotations_in_three_forms():
     says("OpenCV's files give poses in this form, while Kalibr writes 4×4 matrices and COLMAP quaternions.")
     chain = yaml.safe_load((DATA / "kalibr_chain.yaml").read_text(encoding="utf-8"))
@@ -100,18 +90,6 @@ def test_the_stop_makes_a_lens_telecentric():
     assert lands(f, 150, 70) == pytest.approx(lands(f, 200, 70))
     assert lands(-f, 150, 70) == pytest.approx(lands(-f, 150, 80))
     assert lands(10, 150, 70) != pytest.approx(lands(10, 200, 70), rel=0.1)
-
-
-def test_a_symmetric_lens_darkens_as_cos_to_the_fourth():
-    says("The angle alone leaves cos⁴ θ behind a small hole, and behind a symmetric lens whose pupils have no")
-
-    def light(front, back, theta, apart=15.0):  # two thin lenses about a stop
-        slope = np.tan(theta) / (1 - apart / front)
-        return np.cos(np.arctan(slope * (1 - apart / back))) ** 4
-
-    theta = np.radians(40)
-    assert light(60, 60, theta) == pytest.approx(np.cos(theta) ** 4)
-    assert light(-60, 30, theta) > 1.5 * np.cos(theta) ** 4  # a retrofocus lens
 
 
 def test_meters_gamma_and_decibels():

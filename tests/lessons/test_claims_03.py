@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from claims import claims
 
-from camviz.scenes.photographs import photograph
 from camviz_school.views.balloon import balloon_in_sight
 from camviz_school.views.camera_matrix import GLOBE
 from camviz_school.views.intrinsics import IntrinsicsView
@@ -50,18 +49,6 @@ def test_only_a_moved_camera_sees_the_balloon():
     assert all(IntrinsicsView.alone().but(focal_px=f).in_sight() == 0 for f in (150.0, 450.0, 1800.0))
 
 
-def test_the_dolly_zoom_keeps_the_globe_and_the_background_grows():
-    says("Pull distance slowly from 3 m to 12 m.", "the globe keeps its size and all behind it grows")
-    says("For the cat on the wall, 3.17 m behind it, the depth is Z + 3.17:")
-    globe, cat = ([150 * Z / (Z + behind) for Z in (3, 12)] for behind in (0, 3.17))  # fx = 150 px a metre
-    assert globe[0] == globe[1]
-    assert cat[1] > 1.5 * cat[0]
-    says("Cut the middle out of a wide picture and enlarge it: it has the perspective of the long lens's picture")
-    points, centre = np.random.default_rng(1).uniform((-0.1, -0.1, 2), (0.1, 0.1, 9), (50, 3)), [319.5, 239.5]
-    wide, long = pixels(points, matrix(450, 450)), pixels(points, matrix(1800, 1800))
-    np.testing.assert_allclose(long - centre, 4 * (wide - centre), atol=1e-9)
-
-
 def test_k_holds_the_distance_to_the_sensor_in_pixels():
     says("K counts the distance f from lens to sensor in pixels", "Focused at infinity, f is the lens's focal length.")
     says("it holds the distance from lens to sensor, in pixels, at the focus setting of the calibration")
@@ -100,24 +87,6 @@ def test_binning_and_resizing_keep_the_image_s_edges():
     ramp = np.tile(np.arange(16, dtype=np.float32), (16, 1))  # its value is its column
     halved = cv2.resize(ramp, (8, 8), interpolation=cv2.INTER_LINEAR)
     np.testing.assert_allclose(resized(halved[0], 0.5), np.arange(8), atol=1e-6)
-
-
-def test_the_globe_by_hand():
-    says("The middle of the globe is 0.68 m to the right of the axis, 0.36 m below it and 3 m away.")
-    seen = pixels([0.68, 0.36, 3.0], matrix(600, 580, 330, 250))[0]
-    np.testing.assert_allclose(seen, [466.0, 319.6], atol=0.05)
-
-
-def test_the_eye_in_the_binned_portrait():
-    says("a region that begins at (160, 60), binned 4 × 4", "One eye is at pixel (202, 100) of the whole portrait.")
-    grey = cv2.GaussianBlur(photograph("astronaut").mean(axis=-1), (0, 0), 2)
-    row, column = np.unravel_index(grey[90:111, 190:215].argmin(), (21, 25))
-    assert np.hypot(column + 190 - 202, row + 90 - 100) < 3
-    place = resized(np.array([202 - 160, 100 - 60]), 1 / 4)
-    row, column = np.unravel_index(
-        grey[60:260, 160:360].reshape(50, 4, 50, 4).mean(axis=(1, 3))[7:13, 7:14].argmin(), (6, 7)
-    )
-    assert np.hypot(column + 7 - place[0], row + 7 - place[1]) < 1
 
 
 def test_opencv_s_left_camera(samples):

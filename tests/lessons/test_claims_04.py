@@ -94,14 +94,6 @@ def test_the_order_of_three_angles_matters():
     assert angle_of(world_from_cam(30, 20, 10).T @ other) == pytest.approx(10, abs=0.5)
 
 
-def test_units_change_t_alone_and_scale_changes_no_pixel():
-    says("Make the world and t a thousand times larger, and all pixels stay where they are")
-    R, t, K = world_from_cam(30, 10, 5), np.array([100.0, 50, 900]), np.diag([500.0, 500, 1])
-    corners = np.array([[200.0, 125, 0], [0, 0, 0]])
-    seen = [cv2.projectPoints(corners * k, cv2.Rodrigues(R)[0], t * k, K, None)[0] for k in (0.001, 1.0)]
-    np.testing.assert_allclose(*seen, atol=1e-9)
-
-
 def test_the_published_poses(samples):
     says("a calibration made of 13 photographs of a board", "The board's squares are 25 mm wide.")
     file = cv2.FileStorage(str(samples / "left_intrinsics.yml"), cv2.FILE_STORAGE_READ)
@@ -115,14 +107,6 @@ def test_the_published_poses(samples):
     assert errors.argmax() == 1
     assert errors[1] == pytest.approx(1.18, abs=5e-3)
     assert np.median(errors) == pytest.approx(0.2, rel=0.1)
-
-
-def test_the_photographs_show_that_the_camera_stood_still(samples):
-    says("the same screen and keyboard stand at the left of every one")
-    paths = sorted(samples.glob("left??.jpg"))
-    photographs = np.stack([cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) for path in paths])
-    change = np.abs(photographs - np.median(photographs, axis=0)).mean(axis=0)
-    assert np.median(change[400:470, 60:150]) < 10 < 30 < np.median(change[150:350, 250:450])
 
 
 # The numbers of the questions ----------------------------------------------------------------------------------------

@@ -60,13 +60,6 @@ def test_the_one_lamp_is_there_twice():
     assert max(abs(x), abs(y) * 16 / 9) < 1  # within the frame, 90° across and 16:9
 
 
-def test_a_point_moves_along_its_line_to_the_centre():
-    says("each point moves along its line to the centre", "Put in one point, with k1 = −0.28 and k2 = 0.07:")
-    around = np.linspace(0, 2 * np.pi, 12)
-    circle = 0.7 * np.stack([np.cos(around), np.sin(around)], axis=-1)
-    np.testing.assert_allclose(bend(circle, -0.28, 0.07, 0.0, 0.0), circle * g(0.7, -0.28, 0.07) / 0.7, atol=1e-12)
-
-
 def test_what_straightening_keeps():
     says("through a lens with k1 = −0.28 and k2 = 0.07.", "the photograph has f = 286 px")
     says("fx = 219 px, fy = 250 px", "alpha = 1 keeps every pixel of the photograph, f = 206 px")
