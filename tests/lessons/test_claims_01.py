@@ -139,6 +139,7 @@ def test_question_hole():
 
 
 def test_question_ray():
+    says("one pixel, 40 px to the right of the principal point and 30 px below it", "the direction (40, 30, f)")
     says("(40, 30, f), twice that and ten times that all land there")
     seen = pixels(np.outer([1, 2, 10, 3.8e8], [40, 30, K[0, 0]])) - K[:2, 2]
     np.testing.assert_allclose(seen, np.tile([40, 30], (4, 1)), atol=1e-9)
@@ -152,6 +153,8 @@ def test_question_ray():
 def test_questions_homogeneous():
     says("Which pixel is the homogeneous vector (600, 400, 2)?", "(600, 400, 2) and (300, 200, 1) are the same pixel")
     says("Any multiple, such as (1200, 800, 4), is the same pixel", "(640, 480, 4) and (160, 120, 1) are one pixel")
+    says("(300, 200).", "A program writes the place of a pixel as three numbers: (640, 480, 4).", "At (160, 120).")
+    says("640/4 is 160 and 480/4 is 120", "The 4 is a divisor and no label")
     vectors = np.array([[[600.0, 400, 2], [1200, 800, 4], [640, 480, 4]]])
     seen = cv2.convertPointsFromHomogeneous(vectors[0])[:, 0]
     np.testing.assert_array_equal(seen, [[300, 200], [300, 200], [160, 120]])

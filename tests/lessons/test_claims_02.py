@@ -171,7 +171,14 @@ def test_the_exercises_answers_are_camviz_s():
 # The numbers of the questions ----------------------------------------------------------------------------------------
 
 
+def test_question_zoom():
+    says("you change from a 35 mm lens to a 100 mm lens", "still is, by the same ratio: a size in the picture is v·X/Z")
+    globe, lamps = ([image(f, 1600) * size for f in (35, 100)] for size in (0.27 / 1.6, 0.33 / 3.0))
+    assert globe[1] / globe[0] == pytest.approx(lamps[1] / lamps[0])
+
+
 def test_question_refocus():
+    says("A lens of 100 mm is focused as a whole", "first on the hills, then on something 0.8 m away")
     says(
         "the *sensor* is now 114 mm behind the lens instead of 100 mm", "it shrinks from 20.4° to 17.9° for a sensor 36"
     )
@@ -182,6 +189,7 @@ def test_question_refocus():
 
 def test_question_stop():
     says("by 2.44 λ N, 30 µm at f/22 and 2.7 µm at f/2.", "At f/8 it is 11 µm across, two pixels of many cameras.")
+    says("You close the aperture from f/2 to f/22", "at f/22 light is spread into an Airy disc 30 µm across")
     assert [airy_um(22), airy_um(8)] == pytest.approx([30, 11], abs=0.5)
     assert airy_um(2) == pytest.approx(2.7, abs=0.05)
 
@@ -190,6 +198,10 @@ def test_questions_hyperfocal():
     says("A lens has a hyperfocal distance of 10 m.", "At 10 m; then it is sharp enough from 5 m on.")
     says("everything beyond 10 m is blurred by more than c. And the near one is H/3, about 3.3 m")
     says("At 8 m: then it is sharp enough from 4 m on.", "And the near limit is 2.7 m.")
+    says("On infinity; then it is sharp from 5 m on.", "At 5 m; then it is sharp enough from 2.5 m to infinity.")
+    says("Focused at infinity it is sharp enough only from about 10 m on.", "everything beyond 8 m sharply enough")
+    says("At 4 m: then it is sharp enough from 2 m to infinity.", "Then what lies between 4 m and 8 m is lost")
+    says("Focused at 4 m, the lens shows things beyond 8 m with more blur than is allowed.")
     for H, near in ((10, 3.3), (8, 2.7)):
         c = circle_for(50, 4, 1000 * H)
         assert limits(50, 4, 1000 * H, c)[0] / 1000 == pytest.approx(H / 2, rel=0.01)
@@ -213,7 +225,9 @@ def test_questions_inside():
 
 def test_questions_phone():
     says("Its aperture is 2.8 mm wide, the other's 14 mm.", "A phone would need f/0.35.")
-    assert pytest.approx([2.8, 14], abs=0.5) == [5 / 1.8, 26 / 1.8]
+    says("f = 5 mm and f/1.8, a full-frame camera 26 mm and f/1.8", "f = 9 mm at f/2, a large one f = 36 mm at f/2")
+    assert pytest.approx(2.8, abs=0.05) == 5 / 1.8
+    assert pytest.approx(14, abs=0.5) == 26 / 1.8
     assert pytest.approx(0.35, abs=5e-3) == 5 / (26 / 1.8)
     says("blur goes with the diameter f/N: five times less here")
     says("its aperture is 18 mm wide, the other's 4.5 mm", "here 4 times as much", "would need f/0.5 for the same")

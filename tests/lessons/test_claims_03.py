@@ -114,6 +114,7 @@ def test_opencv_s_left_camera(samples):
 
 def test_questions_on_focus_and_millimetres():
     says("A calibration says fx = fy = 1000.", "With pixels of 5 µm this is 5 mm, with pixels of 2 µm it is 2 mm")
+    says("One needs the pixel size for that; with 5 µm it is 5 mm.")
     assert [1000 * 0.005, 1000 * 0.002] == [5, 2]
     says("by 5 % for a thin 50 mm lens focused at one metre", "from 1 m to infinity", "for a thin 35 mm lens by 3.5 %")
     assert 100 * (sensor_at(50, 1000) / 50 - 1) == pytest.approx(5, abs=0.5)
@@ -123,6 +124,7 @@ def test_questions_on_focus_and_millimetres():
 def test_question_crop():
     says("You cut a window of 320 × 240 pixels out of a photograph of 640 × 480, beginning at column 256 and row 96.")
     says("The ray that arrived at column 300 arrives at column 44 now.", "cx − 256 and cy − 96")
+    says("you would believe that every ray came from 256 columns farther left")
     photo = np.arange(640 * 480).reshape(480, 640)
     window = photo[96 : 96 + 240, 256 : 256 + 320]
     assert window[0, 44] == photo[96, 300]
@@ -131,7 +133,9 @@ def test_question_crop():
 def test_question_resize():
     says("A picture 640 pixels wide, with cx = 319.5 in its very middle, is resized to 320 pixels.")
     says("the middle of 320 pixels, numbered 0 … 319, is 159.5", "c′ = s (c + ½) − ½ = 0.5 · 320 − 0.5 = 159.5")
+    says("159.5.", "what stays in place is the *edge* of the image, at −0.5", "160.", "Counted so, cx was 320 before.")
     assert resized(319.5, 0.5) == np.arange(320).mean() == 159.5
+    assert 0.5 * 320 == 160  # from the corner
     says("159.75, half of 319.5.", "A quarter of a pixel sounds little", "c′ = s c + (s − 1)/2")
     assert 319.5 / 2 - 159.5 == 0.25
     assert resized(319.5, 0.5) == 0.5 * 319.5 + (0.5 - 1) / 2
@@ -140,6 +144,7 @@ def test_question_resize():
 def test_questions_on_where_pixels_count_from():
     says("COLMAP says cx = 320.0 for a picture.", "COLMAP puts the centre of the first pixel at 0.5, OpenCV at 0")
     says("The first program finds a lamp at column 100.0.", "At 99.5.", "MATLAB puts it at 1: there, subtract 1")
+    says("319.5.", "320.5.", "At 100.5.", "One program calls the centre of the first pixel 0.5, another calls it 0.")
     corner_of_first_pixel = -0.5
     assert [one + corner_of_first_pixel for one in (320.0, 100.0)] == [319.5, 99.5]
 
@@ -147,7 +152,7 @@ def test_questions_on_where_pixels_count_from():
 def test_questions_on_the_shape_of_a_pixel():
     says("fx = 800 and fy = 1000, one lens.", "Wider than high: width / height = 1.25.", "width / height = 0.8")
     assert cv2.calibrationMatrixValues(matrix(800, 1000), (640, 480), 1, 1)[-1] == 1000 / 800 == 1.25
-    says("pixels that are 1.5 times as high as wide. Its fy is 600.", "900.", "400.")
+    says("pixels that are 1.5 times as high as wide. Its fy is 600.", "900.", "400.", "600 pixel heights, or 1.5 times")
     assert cv2.calibrationMatrixValues(matrix(900, 600), (640, 480), 1, 1)[-1] == pytest.approx(1 / 1.5)
     says("The first row of K reads 800, 8, 320", "Yes, by atan(8/800) = 0.57°.", "they are off by about 0.6°")
     right, down = np.linalg.inv(matrix(800, 800, 320, 240, 8))[:, :2].T

@@ -113,6 +113,7 @@ def test_the_published_poses(samples):
 
 
 def test_question_lock():
+    says("The camera looks straight up: pitch = 90°.", "turn the camera to the right until yaw is 90°")
     says("Yes: yaw 30° and roll −30° are the same rotation there.", "neither yaw nor roll makes the camera look to")
     np.testing.assert_allclose(world_from_cam(30, 90, 0), world_from_cam(0, 90, -30), atol=1e-12)
     np.testing.assert_allclose(world_from_cam(20, 90, 40) @ [0, 0, 1], [0, -1, 0], atol=1e-12)  # y is down
@@ -156,11 +157,8 @@ def test_question_first_coordinates():
 def test_questions_scale():
     says("T and T/1000 mean the same transform", "R/1000 is none: its determinant is 10⁻⁹")
     says("Divide t by 1000 and leave R; give the board's corners in metres.")
-    says(
-        "Only t, which is multiplied by 100.",
-        "All 16 numbers are multiplied by 100.",
-        "with a determinant of a million",
-    )
+    says("Divide the whole matrix by 1000.", "Divide R and t by 1000.", "R and t: both are multiplied by 100.")
+    says("Only t, which is multiplied by 100.", "All 16 numbers are multiplied by 100.", "a determinant of a million")
     R, t, point = world_from_cam(30, 10, 5), np.array([0.1, 0.05, 0.9]), np.array([0.2, 0.125, 0])
     assert [np.linalg.det(R / 1000), np.linalg.det(100 * R)] == pytest.approx([1e-9, 1e6], rel=1e-9)
     for units in (100, 1000):
@@ -173,6 +171,7 @@ def test_questions_scale():
 
 def test_questions_angles():
     says("for these very angles pitch before yaw ends up 10° away")  # as in the test of the lesson's own sentence
+    says('"roll 10, pitch 20, yaw 30"', '"mounted at the angles 40, 20, 10"')
     says("Turning by 40 about y and 20 about x, in one order or the other, ends up 14° apart.")
     y, x = about([0, 1, 0], 40), about([1, 0, 0], 20)
     assert angle_of((y @ x).T @ (x @ y)) == pytest.approx(14, abs=0.5)

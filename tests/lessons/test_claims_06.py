@@ -126,6 +126,7 @@ def test_how_many_boards_zhang_s_method_takes():
     assert rank([(25, 20)], F_ALONE, centre=(0, 0)) == 2
     says("Eight *parallel* boards are worth one: their rank stays 2")
     assert rank([(20, 25)] * 8, ALL_SIX) == 2
+    says("unless the boards are parallel, lean about the same row or column, or mirror each other")
     says("Two boards that both lean about a row of the picture give rank 3, one less than it takes.")
     says("So do two that mirror each other, such as (20, 22)° and (20, −22)° about a row and a column.")
     says("Two tilted about a row and a column suffice, mirrored ones do not.")

@@ -93,6 +93,7 @@ def test_essential_matrices_have_five_numbers_and_four_motions():
 
 def test_eight_pairs_must_be_in_general_position():
     says("so eight pairs in general position are enough, but not seven on one plane and one beside.")
+    says("from at least eight pairs of points in general position")
     says("nor any number on a ruled quadric that holds the centres of both cameras.")
     rng, R = np.random.default_rng(1), Rotation.from_rotvec([0.05, -0.2, 0.1]).as_matrix()
 

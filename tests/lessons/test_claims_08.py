@@ -61,7 +61,7 @@ def test_a_turn_is_a_map_of_pixels_whatever_the_depth():
     assert 400 * ray[:2] / ray[2] + (240, 180) == pytest.approx([318.0, 100.9], abs=0.05)
 
 
-def test_rectified_cameras_are_parallel_and_need_not_face_the_wall(garden):
+def test_rectified_cameras_are_parallel_not_square_to_the_wall(garden):
     says("Nobody has aligned these cameras, which stand 25 cm apart.", "The wall here is not, rectified or not.")
     says("both image planes lie in **one plane, parallel to the baseline**, and their rows run along it")
     R, B, *_ = garden
@@ -215,8 +215,11 @@ def test_question_disparity(garden):
 def test_question_error():
     says("f = 800 px and B = 0.1 m and finds disparities to half a pixel. At 1 m from it that makes 6 mm of depth.")
     says("63 cm: ten times as far, a hundred times the error.", "half a pixel of 80 is 0.6 %, half a pixel of 8 is 6 %")
+    says("What does it make at 10 m?", "6 cm: ten times as far, ten times the error.", "6.3 m: it grows with the cube")
     near, far = (80 / (80 / Z - 1e-6) - Z for Z in (1.0, 10.0))  # of a millionth of a pixel
     assert [1000 * near * 0.5e6, 100 * far * 0.5e6] == pytest.approx([6, 63], abs=0.5)
+    wrong = 100 * 10 * near * 0.5e6, 10 * 1000 * near * 0.5e6  # cm by a linear law, dm by a cube's
+    assert wrong == pytest.approx((6, 63), abs=0.5)
     assert pytest.approx([0.6, 0.6], abs=0.05) == [100 * 0.5 / 80, 10 * 0.5 / 8]
     says("from 8 px to 7.5 px is a longer way than from 80 px to 79.5 px", "The derivative of 1/d is −1/d²")
     assert 80 / 7.5 - 80 / 8 > 10 * (80 / 79.5 - 80 / 80)
@@ -226,6 +229,7 @@ def test_questions_twice():
     """By 2, by 4 or by 9: the baseline that keeps the error in metres, from the exact interval of a small error."""
     says("Yes: ΔZ = Z² Δd / (f B). Or by 2, with twice the focal length.", "would have to become an eighth")
     says("It has to hang 3 m above it and be right to 1 mm still.", "By 9.", "Then the error would be 3 mm")
+    says("A stereo camera hangs 1 m above a conveyor belt and is right to 1 mm.", "By 4.", "Z² has grown 9 times")
 
     def error(Z, fB, step=1e-6):
         return (fB / (fB / Z - step) - Z) / step
@@ -239,6 +243,7 @@ def test_question_first_formula():
     says("now both have f = 700 px, and the cameras stand 0.12 m apart", "own K had fx = 820, and its lens says 4 mm")
     Q = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 700.0], [0, 0, 1 / 0.12, 0]])
     says("2.4 m.", "Yes: 700 · 0.12/35.", "2.8 m.", "That is 820 · 0.12/35.", "1.4 cm.", "That is 4 · 0.12/35")
+    says("A point lies 35 px farther left in the right picture.")
     assert cv2.reprojectImageTo3D(np.full((1, 1), 35, np.float32), Q)[0, 0, 2] == pytest.approx(2.4, rel=1e-6)
     assert pytest.approx([2.8, 1.4], abs=0.05) == [820 * 0.12 / 35, 100 * 4 * 0.12 / 35]
 

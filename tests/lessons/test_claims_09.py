@@ -150,6 +150,7 @@ def corners():
 
 def test_question_ninety():
     says("at 90°: r/f is 1, 1.41, 1.57, 2 and infinity", "Nowhere: tan 90° is infinite.")
+    says("Where does a ray land that comes in exactly from the side, 90° from the axis?")
     assert sorted(r(np.pi / 2) for r in RADIUS.values())[:4] == pytest.approx([1, 1.41, 1.57, 2], abs=5e-3)
     assert RADIUS["perspective"](np.pi / 2) > 1e15
     says("a picture 480 px wide ends 58° from the axis, and one ten times as wide at 86°")
@@ -191,6 +192,7 @@ def test_question_wide_lens(corners):
 def test_questions_designed():
     says("A perspective picture of 180° is infinitely wide. At 120° its edges are already stretched four times along")
     says("75° from the axis a degree already takes 15 times the room", "A ray 95° from the axis comes from behind")
+    says("The lens of a doorbell sees 190° from edge to edge.")
     assert [stretch("perspective", np.radians(at))[0] for at in (60, 75)] == pytest.approx([4, 15], abs=0.5)
     assert ray(190 / 2)[2] < 0 < ray(89)[2]
 
@@ -212,6 +214,7 @@ def test_questions_coefficients():
 def test_questions_omni():
     says("the whole horizon is then 90° from its axis, and a lens of more than 180° sees it")
     says("the lens reaches 100° from its axis. There are 10° to spare", "Its owner buys one fisheye lens of 200°.")
+    says("when it looks up or down and sees more than 180°", "if it looks straight up: the horizon is then 90°")
     around = np.linspace(0, 2 * np.pi, 73)
     level = np.stack([np.sin(around), 0 * around, np.cos(around)], axis=-1)  # y is down
     up, ahead = (np.degrees(np.arccos(level @ axis)) for axis in ([0, -1, 0], [0, 0, 1]))
