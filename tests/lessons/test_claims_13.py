@@ -181,7 +181,7 @@ def test_gains_on_encoded_values():
     raw, gains, matrix, truth = bulb()
     assert delta(decoded((encoded(raw) * gains) @ matrix.T), truth).mean() == pytest.approx(23, abs=0.5)
     says("A factor of 2.2 on encoded values is a factor of 2.2 to the power of 2.2, nearly 6, on light.")
-    assert 2.2**2.2 == pytest.approx(6, rel=0.06)
+    assert pytest.approx(6, rel=0.06) == 2.2**2.2
     assert np.log(0.2) / np.log(encoded(0.2)) == pytest.approx(2.2, rel=0.05)
     linear = cv2.transform((raw * gains)[:, None], matrix)[:, 0]
     np.testing.assert_allclose(lesson13.develop(raw, gains, matrix), np.clip(linear, 0, 1) ** (1 / 2.2))
@@ -220,7 +220,7 @@ def test_without_an_ir_cut_filter_colours_fade():
     assert [off[1].mean(), off[0].mean(), off[1].max()] == pytest.approx([10.3, 0.9, 35.6], abs=0.05)
     assert NAMES[off[1].argmax()] == "foliage"
     says("Silicon counts photons up to 1100 nm")
-    assert 1239.84 / 1.12 == pytest.approx(1100, rel=0.02)  # its band gap in eV
+    assert pytest.approx(1100, rel=0.02) == 1239.84 / 1.12  # its band gap in eV
 
 
 def test_bradfords_matrix_and_cielab_are_as_published():
@@ -249,7 +249,7 @@ def test_between_two_matrices():
     np.testing.assert_allclose(mixture, warm + share * (cold - warm))
     means = [delta(balanced @ M.T, truth).mean() for M in (warm, cold, mixture, own, evenly)]
     assert means == pytest.approx([1.78, 1.68, 0.95, 0.88, 1.15], abs=5e-3)
-    assert [2 / (1 / 2856 + 1 / 6504), (2856 + 6504) / 2] == pytest.approx([3970, 4680], rel=1e-3)
+    assert pytest.approx([3970, 4680], rel=1e-3) == [2 / (1 / 2856 + 1 / 6504), (2856 + 6504) / 2]
     says("near 4224 K, is no glowing body: the mixture leaves 1.66, where its own matrix leaves 0.81.")
     lamp = illuminant("FL2")
     kelvin = uv_to_CCT_Ohno2013(colour.xy_to_UCS_uv(colour.XYZ_to_xy(lamp @ EYE)))[0]
