@@ -1,4 +1,4 @@
-"""Tests of what the lessons say, one file per lesson."""
+"""What tests of the lessons share: OpenCV's samples."""
 
 import os
 from functools import cache
@@ -7,15 +7,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from quoting import Quotes
-
-
-@pytest.fixture
-def says(request):
-    """Quotes a sentence of the lesson that the test file is named after; returns its numbers, which must be used."""
-    quotes = Quotes(request.path.name.split("_")[1])
-    yield quotes
-    quotes.hold()
 
 
 @pytest.fixture(scope="session")

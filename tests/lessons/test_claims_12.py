@@ -199,32 +199,6 @@ def test_blur_helps_before_sampling_only(plate):
     assert swing(before) < swing(plain) / 10 < 0.99 * swing(plain) < swing(after)
 
 
-def test_two_crossed_plates_make_two_spots():
-    """By the field of each ray, plate after plate (Jones)."""
-    says("A second plate, turned by 90°, would move only one of them: two spots still.")
-    says("Then the second plate splits both, and four spots stand in a square, d pixels wide.")
-
-    def spots(*plates):
-        landed = {}
-        for field in ([1, 0], [0, 1]):
-            rays = {(0.0, 0.0): np.array(field, dtype=complex)}
-            for d, axis in plates:
-                split = {}
-                for place, one in rays.items():
-                    along, aside = (one @ axis) * axis, tuple(np.round(np.array(place) + (d or 0) * axis, 9) + 0.0)
-                    for where, part in ((aside, along if d else 1j * along), (place, one - along)):
-                        split[where] = split.get(where, 0) + part
-                rays = split
-            for place, one in rays.items():
-                landed[place] = landed.get(place, 0) + np.sum(np.abs(one) ** 2) / 2
-        return {place: share for place, share in landed.items() if share > 1e-9}
-
-    x, y = np.eye(2)
-    assert len(spots((1, x), (1, y))) == 2
-    square = {(0, 0): 0.25, (1, 0): 0.25, (0, 1): 0.25, (1, 1): 0.25}
-    assert spots((1, x), (None, (x + y) / np.sqrt(2)), (1, y)) == pytest.approx(square)
-
-
 def test_malvars_green_is_that_of_colour_demosaicing(plate, astronaut):
     measured = np.random.default_rng(4).random((24, 30))
     windows = np.lib.stride_tricks.sliding_window_view(measured, (5, 5))[::2, ::2]

@@ -7,8 +7,8 @@ from claims import claims
 from scipy import constants
 from scipy.stats import nbinom
 
-from camviz.sensors import PUBLISHED, SHUTTERS, Sensor, decibel, smeared, transferred
-from camviz.sensors.published import CMV4000, IMX174, KAF_0400, KAF_3200ME
+from camviz.sensors import PUBLISHED, SHUTTERS, Sensor, decibel, transferred
+from camviz.sensors.published import CMV4000, IMX174, KAF_3200ME
 from camviz_school.course.material import module
 from camviz_school.views.readout import ReadoutView, fan
 
@@ -74,16 +74,6 @@ def test_a_packet_arrives_with_a_trail():
     assert lesson14.arriving(point[:, 0], 0.99)[19] == pytest.approx(law[0])
 
 
-def test_a_lamp_s_stripe_is_as_bright_as_its_rows_pass():
-    says("It is the time of one shift divided by the exposure, times the number of rows that the lamp covers.")
-    light = np.zeros(50)
-    light[20:24] = 1e6
-    for exposure in (1e-3, 1e-4):  # a packet gathers under every row that it passes, and stops at its own
-        gathered = np.full(50, light.sum() * 2e-6) + light * exposure
-        np.testing.assert_allclose(smeared(light[:, None] * exposure, exposure, 2e-6)[:, 0], gathered)
-        assert gathered[0] / (gathered[21] - gathered[0]) == pytest.approx(2e-6 / exposure * 4)
-
-
 def test_photons_of_a_lux():
     says("A lux is 1/683 W/m² of green light of 555 nm", "with 4091 photons per lux, second and µm²")
     assert constants.physical_constants["luminous efficacy"][0] == 683
@@ -110,7 +100,8 @@ def test_the_threshold_is_near_sigma_and_a_half():
         assert sensor.threshold_photons() == pytest.approx(threshold(noise, 1 / 6.5), rel=1e-9)
     says("The threshold was taken as σ + ½.", "61.7 dB. The natural logarithm is 2.303 times as large")
     ratio = 30_957 * 0.45136 / (np.hypot(10.898, np.sqrt(1 / 12) / 0.280769) + 0.5)  # the emva1288 project's file
-    assert [db(ratio), 20 * np.log(ratio)] == pytest.approx([61.7, 142], abs=0.2)
+    assert db(ratio) == pytest.approx(61.7, abs=0.05)
+    assert 20 * np.log(ratio) == pytest.approx(142, abs=0.5)
     assert decibel(ratio) == pytest.approx(db(ratio))
 
 
@@ -138,9 +129,10 @@ def test_iso_and_dual_conversion_gain():
         noise = np.hypot(120, 300 * full * microvolts / 1e6) / microvolts
         return full, noise, db(full / (noise + 0.5))
 
-    assert of(100, 30)[::2] == pytest.approx((33_333, 69.4), rel=1e-3)
-    assert of(400, 120) == pytest.approx((8333, 2.7, 68.3), rel=0.02)
-    assert of(400, 30) == pytest.approx((8333, 4.7, 64.1), rel=0.01)
+    assert [of(100, 30)[0], of(400, 120)[0], of(400, 30)[0]] == pytest.approx([33_333, 8333, 8333], abs=0.5)
+    assert [of(100, 30)[2], *of(400, 120)[1:], *of(400, 30)[1:]] == pytest.approx(
+        [69.4, 2.7, 68.3, 4.7, 64.1], abs=0.05
+    )
 
 
 def test_reset_noise():
@@ -169,20 +161,6 @@ def test_published_figures():
     order = sorted(rows, key=lambda one: one.sensor.saturation_e / threshold(one.sensor.read_noise_e))
     kinds = [one.technology for one in order]
     assert kinds[0] == kinds[-1] == "CCD" != min(kinds[1:-1], key="CCD".__eq__)
-
-
-def test_an_incandescent_bulb_leaves_little_blue():
-    says(
-        "It catches 3 photons in a hundred at 400 nm, 40 at 700 nm.", "have to multiply it by 5.5, its noise included."
-    )
-    assert KAF_0400.sensor.efficiency(np.array([400, 550, 700])) == pytest.approx([0.03, 0.33, 0.40])
-    shape = colour.SpectralShape(380, 780, 5)
-    light = colour.SDS_ILLUMINANTS["A"].copy().align(shape)
-    curves = colour.MSDS_CAMERA_SENSITIVITIES["Nikon 5100 (NPL)"].copy().align(shape).values
-    passed = curves / light.wavelengths[:, None]
-    caught = np.interp(light.wavelengths, (400, 550, 700), (3, 33, 40)) * light.values * light.wavelengths
-    freed = caught @ (passed / passed.max(axis=0))
-    assert freed.max() / freed[2] == pytest.approx(5.5, rel=0.02)
 
 
 def test_questions_fill_factor_and_sheets():
@@ -215,5 +193,5 @@ def test_questions_decibel():
     says("(SNR 173 against 100)", "B gets 7500/1.5, and A 45,000/9: both 5000.", "Yes, 74 dB or 12.3 stops.")
     assert 30_000 / 7.5 == 10_000 / 2.5 == 4000
     assert 7500 / 1.5 == 45_000 / 9 == 5000
-    assert [db(4000), db(5000), np.sqrt(30_000)] == pytest.approx([72.0, 74, 173], abs=0.25)
-    assert [np.log2(4000), np.log2(5000)] == pytest.approx([12, 12.3], abs=0.05)
+    assert [db(4000), np.log2(4000), np.log2(5000)] == pytest.approx([72.0, 12, 12.3], abs=0.05)
+    assert [db(5000), np.sqrt(30_000)] == pytest.approx([74, 173], abs=0.5)
