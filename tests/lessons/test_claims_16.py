@@ -153,6 +153,8 @@ def test_the_median_length_of_gaussian_residuals():
     says("half of all residuals are shorter than σ√(2 ln 2)")
     lengths = norm(np.random.default_rng(1).normal(0, 1, (400_000, 2)), axis=1)
     assert np.median(lengths) == pytest.approx(np.sqrt(2 * np.log(2)), rel=0.005)
+    normal = np.random.default_rng(2).normal(0, 0.14, (20, 400, 2))
+    assert lesson16.robust_sigma(normal) == pytest.approx(0.14, rel=0.05)
 
 
 def test_the_published_left_camera(samples):

@@ -76,6 +76,8 @@ def test_any_known_angle_gives_an_equation_for_f():
 
     assert brentq(lambda f: angle(f) - 60, 50, 5000) == pytest.approx(seen.intrinsics.fx)
     square = VanishingView(aside=-3.0, turn_deg=42.0)
+    says("The points of its level and of its upright edges are both at infinity")
+    np.testing.assert_allclose(square.camera.extrinsics[0][2, :2], 0, atol=1e-9)  # the depths of both directions
     assert np.isnan(square.pixels["x"]).all()
     assert np.isnan(lesson18.focal_length(square.pixels["x"], square.pixels["z"], CENTRE))
 
