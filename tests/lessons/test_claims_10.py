@@ -96,6 +96,7 @@ def test_opencv_gives_an_image_to_points_that_have_none():
 
 
 def test_the_middle_tells_f_over_1_plus_xi_only():
+    says("You double the focal length f of a unified sphere with ξ = 1 and change ξ to 3")
     says("In the middle the three cameras agree to a few hundredths of a pixel.")
     says("At the rim they are more than 100 px apart.", "The rim does change, but it shrinks: a larger ξ draws it in.")
     cameras = ((300.0, 1e-12), (600.0, 1.0), (1200.0, 3.0))
@@ -138,6 +139,7 @@ def test_a_polynomial_fits_a_sphere_whose_viewpoint_moves():
 
 
 def test_parallax_in_a_ring_s_panorama():
+    says("Six cameras look outwards from a ring of 25 cm radius", "At a seam stands a globe, 3 m away.")
     says("with six cameras and r = 0.25 m, b is 0.25 m.", "A panorama of 4000 px has 4000/(2π) = 637 px per radian.")
     says("So at 3 m b/Z says 53 px.", "Even half a centimetre between two lenses makes 3 px at a distance of 1 m")
     assert 0.5 * np.sin(np.pi / 6) == pytest.approx(0.25)
@@ -174,6 +176,7 @@ def test_question_conversion():
 
 
 def test_questions_rms():
+    says("Yes: 266.7 px both times.")
     says("(f, ξ) = (560, 1.1) and (640, 1.4). Both have an RMS of 0.2 px.", "560/2.1 and 640/2.4 are both 266.7")
     says("The mean is (600, 1.25), with 266.7 px once more.", "since 300/1.5 and 400/2 are both 200 px")
     says("Anna finds (f, ξ) = (300 px, 0.5), Ben (400 px, 1.0).", "350/1.75 is 200 px once more")
@@ -182,3 +185,19 @@ def test_questions_rms():
     assert np.abs(image(15, 560, 1.1) - image(15, 640, 1.4)) < 0.2
     near, far = (np.abs(image(t, 300, 0.5) - image(t, 400, 1.0)) for t in (5, 80))
     assert near < 0.2 < 5 < far
+
+
+def test_questions_seam_and_fisheye():
+    """Where the right camera's ray to a person at the seam meets the circle for which the panorama is stitched."""
+    says(
+        "stitched for 5 m. Straight out at a seam, a person comes nearer, from 5 m to 2 m.",
+        "The person is whole at 5 m",
+    )
+    camera = 0.25 * np.array([np.sin(np.pi / 8), np.cos(np.pi / 8)])
+    for Z, lost in ((5.0, False), (2.0, True)):
+        ray = (np.array([0, Z]) - camera) / norm(np.array([0, Z]) - camera)
+        b = camera @ ray
+        hit = camera + (-b + np.sqrt(b * b - camera @ camera + 5**2)) * ray
+        assert (hit[0] < -0.01) == lost
+    says("A fisheye of more than 180° that looks straight up is both", "It has a fisheye lens of 180°.")
+    assert at_angle(180 / 2 + 1)[2] < 0 < at_angle(180 / 2 - 1)[2]

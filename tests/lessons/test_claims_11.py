@@ -31,6 +31,7 @@ def thirds(microlens, n=PLACES, per=3):
 
 
 def test_the_slope_of_a_thing_tells_its_distance():
+    says("What the main lens was focused on, at 4 m, has the same place in all views.", "by d = b f (1/z − 1/4) pixels")
     says("The views of the garden are b = 0.056 m apart, and f = 232.3 px. So b f = 13.0 px·m. Take the globe, 3.03 m")
     says("The globe has d = 1.04, nearly 1.", "each view blurs them over 3.25 px", "the fence, 2.0 m away")
     assert pytest.approx([232.3, 13.0], abs=0.05) == [F, B * F]
@@ -94,6 +95,7 @@ def test_what_views_cost_in_pixels():
 
 
 def test_patches_give_the_wall_back():
+    says("Patches of 3 are right for this wall. What does a picture show that is made of patches of 5?")
     says("first microlens may see 0 1 2 3 4.", "The next one then sees 3 4 5 6 7.", "1 2 3 and 4 5 6: the wall")
     assert [thirds(0, 5), thirds(1, 5)] == [[0, 1, 2, 3, 4], [3, 4, 5, 6, 7]]
     assert thirds(0, 5)[1:4] + thirds(1, 5)[1:4] == [1, 2, 3, 4, 5, 6]
@@ -131,6 +133,7 @@ def test_the_sum_focuses_what_moves_by_d():
 
 
 def test_questions_cost_and_veil():
+    says("10 × 10 = 100 views share the sensor", "A mask that leaves out the 20 views would remove the veil")
     says("sensor of 40 million pixels and 10 × 10 of them under each microlens", "Yes: 40 / 100 = 0.40 million")
     says("a picture of about 630 × 630 pixels", "About 4 million, a tenth.", "They do take part, 100 at a time")
     assert np.sqrt(40e6 / 100) == pytest.approx(630, rel=0.01)
@@ -144,6 +147,7 @@ def test_questions_cost_and_veil():
 
 
 def test_question_half_of_every_square():
+    says("each through another part of its main lens, which is focused at 3 m")
     says("small lens above every square of 9 × 9 pixels", "About half of them in every square.", "At 3 m.")
     light = np.ones((9 * 4, 9 * 6, 1))
     light[np.arange(36) % 9 >= 5] = 0  # what came through the covered places of the lens

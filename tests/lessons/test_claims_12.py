@@ -250,6 +250,7 @@ def test_question_names():
 
 
 def test_questions_measured():
+    says("A camera of 12 megapixels gives you", "A sensor of 48 megapixels under", "A camera of 20 megapixels takes")
     says("12 million: one of each pixel's three numbers.", "That would make 3 million pixels of three numbers each")
     says("it measures 12 million numbers and makes up 24 million.", "of its 48 million green numbers", "24 million.")
     says("Of red and blue, 36 million each are guessed.", "In 5 million: at every fourth pixel.")

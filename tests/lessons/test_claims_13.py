@@ -123,6 +123,7 @@ def test_balance_brings_the_greys_home_and_not_the_colours():
 
 
 def test_the_matrix_translates_the_colours():
+    says("it takes the 3 × 3 matrix")
     says("The matrix brings the mean ΔE of all 24 from 7.15 down to 0.96.", "leaves 2.98 in the light of the bulb.")
     raw, gains, matrix, truth = bulb()
     of_daylight = in_light(illuminant("D65"))[1]
@@ -270,6 +271,10 @@ def test_adobe_s_matrix_suits_the_virtual_nikon():
 
 
 def test_questions_delta():
+    says(
+        "The matrix was fitted to those 24 spectra",
+        "Little: its paints reflect light in other ways than the 24 patches.",
+    )
     says("A matrix leaves ΔE2000 = 0.96 on average over the chart.", "It is a mean: red is off by 3.3 here.")
     says("a mean of 0.96 goes with a red patch that is off by 3.3", "fit is to 24 spectra in one light")
     raw, gains, matrix, truth = bulb()

@@ -39,6 +39,7 @@ def reset_noise(microvolts, kelvin=300.0):
 
 
 def test_a_short_exposure_takes_the_blur_and_leaves_the_bend():
+    says("photographs a fan that makes 12 turns a second", "You shorten the exposure from 1/100 s to 1/1000 s.")
     says(
         "each of its 480 rows is exposed 64 µs after the one above",
         "the last row is still exposed 31 ms after the first",
@@ -149,6 +150,9 @@ def test_reset_noise():
 
 
 def test_published_figures():
+    says(
+        "*A*: quantum efficiency 77 %, 6.8 e⁻ of noise in the dark, saturated at 32,700 e⁻. *B*: 57 %, 8.3 e⁻, 5900 e⁻."
+    )
     says("It opens as the IMX174: 77 %, 6.8 e⁻ of noise, saturated at 32,691 e⁻")
     sensor = IMX174.sensor
     figures = [100 * sensor.efficiency(), sensor.read_noise_e, sensor.saturation_e, IMX174.pitch_um]
@@ -164,6 +168,11 @@ def test_published_figures():
 
 
 def test_questions_fill_factor_and_sheets():
+    says(
+        "1000 photons of 550 nm arrive on the whole pixel.",
+        "600 is right for 550 nm.",
+        "At 550 nm 60 of a hundred are good",
+    )
     says("quantum efficiency × fill factor 60 % at 550 nm, with microlenses", "252: 42 % of 600")
     assert (1000 * CMV4000.sensor.efficiency(), 0.42 * 600) == (pytest.approx(600), pytest.approx(252))
     says("The KAF-3200ME, a CCD too, has 79 %, 12.6 e⁻ and 70,000 e⁻, and a greater dynamic range than A.")
@@ -175,6 +184,11 @@ def test_questions_fill_factor_and_sheets():
 
 
 def test_question_bits():
+    says(
+        "A sensor is saturated at 6000 e⁻ and has 8 e⁻ of noise in the dark.",
+        "with a converter of 10 bits",
+        "one of 16 bits",
+    )
     says("Saturation over threshold is 6000 / 8.5, 57 dB or 9.5 stops", "By 96 dB − 60 dB = 36 dB")
     says("With 10 bits a step is 5.9 e⁻, whose rounding noise, 5.9/√12 = 1.7 e⁻", "from 8.5 to 8.7 e⁻", "worth 0.2 dB")
     says("with 9 bits, steps of 11.7 e⁻, the threshold is 9.2 e⁻ and not 8.5. With 6 bits, steps of 95 e⁻")
@@ -187,6 +201,10 @@ def test_question_bits():
 
 
 def test_questions_decibel():
+    says("Sensor A is saturated at 30,000 e⁻ and has 7 e⁻ of noise in the dark. Sensor B: 10,000 e⁻ and 2 e⁻.")
+    says(
+        "saturated at 45,000 e⁻ and has 8.5 e⁻ of noise in the dark, sensor B 7500 e⁻ and 1 e⁻", "the same, 5000 to 1."
+    )
     says(
         "30,000 / 7.5 is 4000, 72.0 dB. For B, 10,000 / 2.5 is 4000 too.", "They are equal: 4000 to 1, 72 dB, 12 stops."
     )

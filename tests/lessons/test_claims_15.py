@@ -51,6 +51,7 @@ def test_the_line_of_slope_a_half_stands_at_the_root_of_k():
 
 
 def test_one_frame_hides_the_gain_and_two_tell_it():
+    says("up to 15,000 electrons. You take the variance", "The pixels differ in their response by 1 %.")
     says("with exposures spread evenly up to 15,000 electrons it comes out 2.1 times too large")
     says("At 10,000 electrons (0.01 · 10,000)² = 10,000: 1 % of pattern has already doubled the variance.")
     assert pytest.approx(10_000) == (0.01 * 10_000) ** 2
@@ -172,6 +173,7 @@ def test_photons_stir_every_block():
 
 
 def test_jpeg_raises_the_noise():
+    says("Two frames of a grey wall in bright light are saved as JPEG of quality 95.")
     says("So quality 95 *raises* the noise of bright light, and K comes out near 0.5 where 0.38 is true.")
     says("The variance of the noise grows by more than a third.", "adds step²/12 to its variance, as any rounding does")
     rng, pattern = np.random.default_rng(1), np.random.default_rng(14).standard_normal((2, 120, 160))
@@ -191,6 +193,12 @@ def test_jpeg_raises_the_noise():
 
 
 def test_questions_light():
+    says(
+        "A pixel counts 2,500 electrons of light",
+        "A pixel counts 400 electrons in the first.",
+        "20 or 30 more or fewer.",
+    )
+    says("heat frees 100 electrons in each pixel during a minute", "You average 64 frames of the same scene.")
     says("A pixel of the grey card counts 500 electrons.", "√2,500 = 50 electrons is what they differ by.")
     says("By about 50 electrons, 2 %.", "With four times the light it would be 100 electrons, and only 1 %.")
     says(

@@ -126,6 +126,7 @@ def test_a_board_of_paper_is_not_in_the_bars():
 
 
 def test_poses_absorb_a_moved_principal_point():
+    says("someone changes cx by 50 px and lets the board poses be fitted again")
     says("is 52 pixels from its true place, 51 of them by the shift, and the error of the fit is half a pixel")
     says(
         "every board was turned by about five degrees (4.5° to 5.4°)", "by 5.5° about the camera (50 px at f = 522 px)"
@@ -344,6 +345,11 @@ def test_gauge_freedom():
 
 
 def test_questions_squares_and_a_turn():
+    says(
+        "have cx 12 px apart",
+        "In one of them the error is 3 px, in the others 0.2 px.",
+        "Now cy is 8 px greater, at f = 640 px.",
+    )
     says("one corner that is 30 px off weighs as much as 10,000 corners that are 0.3 px off")
     says(
         "one corner that is 3 px off weighs as much as 225 that are 0.2 px off",

@@ -166,6 +166,7 @@ def test_the_two_bowls_of_a_thin_lens_by_traced_rays():
 
 def test_the_corners():
     """The share of the aperture that the rim leaves open, counted point by point; and a hole's light, ray by ray."""
+    says("At f/1.4 the corners of your pictures are much darker than the middle. You stop down to f/8")
     says("A rim of the barrel, 32 mm wide, stands 20 mm in front of the aperture.", "through a lens of 35 mm on full")
     says("At f/1.4 the corner gets 31 % of the light in the middle, and at f/8 it still gets only 52 %.")
     slope, (v, u) = np.hypot(36, 24) / 2 / 35, np.mgrid[-1:1:1201j, -1:1:1201j]
@@ -185,6 +186,7 @@ def test_the_corners():
 
 
 def test_iso_multiplies_the_signal_after_the_exposure():
+    says("You turn ISO from 100 to 1600.")
     says("**ISO is gain.** It multiplies the signal of the pixel's electrons, and with it all noise that comes before")
     says("Noise that comes after it is not lifted (lesson 14); the camera above has none of that kind.")
     says("it multiplies the signal after the exposure, with the noise that it has by then")
@@ -204,6 +206,7 @@ def test_iso_multiplies_the_signal_after_the_exposure():
 
 
 def test_a_meter_s_greys():
+    says("Yes: 18 % of white, whatever it is.", "it makes the mean of the picture 18 % of white")
     says("In full sun f/16 at 1/125 s is right for ISO 100: EV 15, the sunny 16 rule. f/8 at 1/500 s lets in the same")
     assert np.log2([16**2 * 125, 8**2 * 500]) == pytest.approx([15, 15], abs=0.05)
     says(
@@ -230,6 +233,7 @@ def test_two_cameras_of_one_number():
 
 
 def test_what_glass_sends_back():
+    says("Yes. Each surface sends back about 4 % of the light.")
     says("has 20 surfaces. Without a coating each reflects 4 % or more", "20 surfaces make 190 pairs.")
     says("Six surfaces leave 78 % of it, and twenty leave 44 %.")
     assert pytest.approx(4) == 100 * ((1.5 - 1) / (1.5 + 1)) ** 2  # Fresnel, straight in
@@ -245,6 +249,7 @@ def test_a_veil_on_black():
 
 
 def test_question_stop_down():
+    says("the sensor stands 40 µm behind the sharp image. Its pixels are 4 µm wide.", "for green light of 550 nm")
     says("Out of focus by 40 µm, the cone of f/1.4 is 29 µm wide on the sensor: seven pixels.")
     says("The disc of the rays is 40 µm / N wide, the Airy disc 2.44 λ N. They are equally wide at N = 5.5")
     says("At f/32 the rays' disc is only 1.3 µm wide, and the Airy disc 43 µm.", "125 cycles per mm here")
@@ -254,6 +259,9 @@ def test_question_stop_down():
 
 
 def test_questions_mtf_and_causes():
+    says(
+        "come out with 30 % of their contrast", "Its mark is 0.6", "As stripes everywhere, with 60 % of their contrast."
+    )
     says(
         "Yes: 0.25 cycles per pixel is one cycle in four pixels, and 0.3 of its contrast is left.",
         "Yes: 0.6 times 0.5.",
@@ -282,6 +290,7 @@ def test_questions_stops():
 
 
 def test_question_noise():
+    says("The one of 1/10 s: it got more light.")
     says("once for 1/10 s at ISO 200, once for 1/160 s at ISO 3200", "Yes: 16 times the light.", "four times as strong")
     few, many = (np.random.default_rng(4).poisson(n, 40_000) for n in (500, 500 * 160 / 10))
     assert (many.mean() / many.std()) / (few.mean() / few.std()) == pytest.approx(4, rel=0.03)

@@ -216,6 +216,7 @@ def test_question_tilted():
 
 
 def test_questions_cropped_focal_and_horizon():
+    says("Someone cuts 200 columns off the left side of a photograph.")
     says(
         "At the same spot of the scene, 100 pixels left of the new middle.",
         "falls by 200, and that of the middle by 100",

@@ -273,6 +273,7 @@ def test_opencv_s_points_are_the_true_ones_after_alignment():
 
 
 def test_questions_turn_step_and_scale():
+    says("A model of a church was made of 200 photographs")
     says(
         "is turned by 24° to the right, and takes another",
         "taken 30 cm farther to the right",
