@@ -41,7 +41,7 @@ def bad_files(folder):
         "picture.yml": (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "this is a PNG picture"),
         "truncated.yml": (calibration[:50], "not valid YAML"),
         "nan.yml": (MONO.format(fx=".nan", d="0, 0, 0, 0"), "expected a finite number"),
-        "zero.yml": (MONO.format(fx=0, d="0, 0, 0, 0"), "fx must be a positive focal length"),
+        "zero.yml": (MONO.format(fx=0, d="0, 0, 0, 0"), "fx = 0: the camera is not calibrated"),
         "count.yml": (MONO.format(fx=500, d="0, 0, 0, 0, 0, 0"), "expected 4, 5, 8, 12 or 14 numbers"),
         "rotation.yml": (pair + "R: [1, 0, 0, 0, 1, 0, 0, 0, 2]\nT: [-1, 0, 0]", "expected a rotation"),
         "bomb.yml": (BOMB, "unfolds to more than"),

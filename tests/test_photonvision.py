@@ -224,7 +224,7 @@ REFUSED = {
             )
         ]
     },
-    "fx must be a positive focal length": {"cameraIntrinsics": matrix(K * [[-1, 1, 1], [1, 1, 1], [1, 1, 1]])},
+    "got fx = -353.75 and fy = 352.5 px: the x axis points left": {"cameraIntrinsics": matrix(K * [[-1, 1, 1], [1, 1, 1], [1, 1, 1]])},
 }
 
 

@@ -186,6 +186,7 @@ class Marks(tuple[Mark, ...]):
 
 
 NOTHING = Marks()
+"""Marks that draw nothing."""
 
 
 def _lines_of(mark: Mark) -> tuple[Array, ...]:

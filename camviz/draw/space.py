@@ -65,15 +65,15 @@ def draw_space(
         scenery: Of `scene_items`.
 
     Returns:
-        content: SVG.
+        content: Marks.
         photographs: Pictures that it shows, by name.
 
     Raises: ValueError for another renderer.
 
     >>> eye = OrbitCamera(distance=4, yaw_deg=0, pitch_deg=0)
-    >>> svg, _ = draw_space(space_panel("", 0, 0, 200, 100), [Line([(0, 0, 0), (1, 0, 0)])], eye, renderer="wire")
-    >>> svg.split('"')[1]  # 1 m, 4 m away: 50 / tan(35°/2) / 4
-    'M100,50L139.6,50'
+    >>> marks, _ = draw_space(space_panel("", 0, 0, 200, 100), [Line([(0, 0, 0), (1, 0, 0)])], eye, renderer="wire")
+    >>> marks.points("ink").tolist()  # 1 m, 4 m away: 50 / tan(35°/2) / 4
+    [[100.0, 50.0], [139.6, 50.0]]
     """
     viewport = _viewport(eye, round(panel.width), round(panel.height))
     if frame is not None:

@@ -10,12 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.draw.marks import NOTHING, Discs, Group, Image, Lines, Marks, Rect, Segments, Text, join
-
-__all__ = [
-    "NOTHING", "Marks", "dots", "group", "image", "join", "line", "paragraph", "path", "polygon", "rectangle",
-    "segments", "text",
-]  # fmt: skip
+from camviz.draw.marks import NOTHING, Discs, Group, Image, Lines, Marks, Rect, Segments, Text, join  # noqa: F401
 
 
 def path(lines: Iterable[ArrayLike], class_: str, *, closed: bool = False, **style: Any) -> Marks:
