@@ -179,7 +179,9 @@ REFUSED = {
     "distortion_coeffs: expected 1, .* or 12 numbers .* got 13": {"distortion_coeffs": [0.0] * 13},
     "camera_matrix: expected 3×3 numbers, got 0": {"camera_matrix": []},
     "camera_matrix: expected no skew, .* got 2": {"camera_matrix": [[FX, 2.0, CX], [0.0, FY, CY], [0.0, 0.0, 1.0]]},
-    "got fx = -1825.5 and fy = 1820.25 px: the x axis points left": {"camera_matrix": [[-FX, 0, CX], [0, FY, CY], [0, 0, 1]]},
+    "got fx = -1825.5 and fy = 1820.25 px: the x axis points left": {
+        "camera_matrix": [[-FX, 0, CX], [0, FY, CY], [0, 0, 1]]
+    },
     "crop: expected a positive number, got 0": {"crop": 0.0},
     "frame_readout_direction: expected TopToBottom or": {
         "frame_readout_time": 8.0,

@@ -224,7 +224,9 @@ REFUSED = {
             )
         ]
     },
-    "got fx = -353.75 and fy = 352.5 px: the x axis points left": {"cameraIntrinsics": matrix(K * [[-1, 1, 1], [1, 1, 1], [1, 1, 1]])},
+    "got fx = -353.75 and fy = 352.5 px: the x axis points left": {
+        "cameraIntrinsics": matrix(K * [[-1, 1, 1], [1, 1, 1], [1, 1, 1]])
+    },
 }
 
 
