@@ -35,7 +35,7 @@ def test_the_corners_of_the_picture_follow_the_fall_off():
     assert dark[middle].mean() == pytest.approx(plain[middle].mean(), rel=0.01)
 
 
-def test_stopping_down_removes_the_rim_and_leaves_the_fourth_power():
+def test_stopping_down_leaves_the_fourth_power():
     corner = np.array(21.6)
     wide, narrow = (ExposureView(vignetting="cos⁴ and rim", f_number=N).falloff(corner) for N in (1.4, 5.6))
     assert wide < 0.7 * narrow

@@ -69,7 +69,7 @@ def test_the_marks_meet_at_the_depth_that_the_formula_gives():
 # The pictures --------------------------------------------------------------------------------------------------------
 
 
-def test_the_rectified_picture_is_what_a_turned_camera_would_have_taken():
+def test_the_rectified_picture_is_a_turned_cameras():
     seen = stereo_pair.pictures(VIEW.source, 0.25, 1.0, 480)
     for picture, camera in ((seen.left, VIEW.stage.pair.left), (seen.right, VIEW.stage.pair.right)):
         taken = snapshot(textured_scene(), camera)
@@ -124,7 +124,7 @@ def test_the_truth_is_what_rays_of_the_rectified_camera_meet(draft, most):
     assert np.nanpercentile(off, 90) < 1
 
 
-def test_matching_along_rows_fails_as_taken_and_succeeds_rectified():
+def test_matching_along_rows_needs_rectification():
     assert VIEW.but(rectify=0.0).score().bad > 0.9
     assert VIEW.score().bad < 0.3
     assert VIEW.score().bad - VIEW.score().missing < 0.12
@@ -162,7 +162,7 @@ def test_half_a_pixel_is_worth_6_mm_at_1_m_and_63_cm_at_10_m():
 
 
 @pytest.mark.parametrize("way", [0.0, 0.5, 1.0])
-def test_dragging_moves_the_marks_along_with_the_turning_pictures(way):
+def test_dragging_moves_the_marks_with_the_pictures(way):
     view = VIEW.but(rectify=way)
     target = view.but(column=300.0, row=120.0)
     moved = view.dragged("left", *centre_of(view._image_panel("left"), target.uv_left), 1, 1)
