@@ -43,9 +43,9 @@ class SavedImage:
         if self.source.startswith("data:image/png;base64,"):
             head = b64decode(self.source.partition(",")[2][:64])
             return float(int.from_bytes(head[16:20], "big")), float(int.from_bytes(head[20:24], "big"))
-        if self._root is None or not {"width", "height"} <= self._root.attrib.keys():
+        if self.root is None or not {"width", "height"} <= self.root.attrib.keys():
             raise ValueError(f"a picture must be a PNG or an SVG with a width and a height, got {self.source[:40]!r}")
-        return float(self._root.attrib["width"]), float(self._root.attrib["height"])
+        return float(self.root.attrib["width"]), float(self.root.attrib["height"])
 
     @cached_property
     def _svg(self) -> str:
@@ -53,18 +53,19 @@ class SavedImage:
         return b64decode(data).decode() if kind == "data:image/svg+xml;base64" else ""
 
     @cached_property
-    def _root(self) -> Element | None:
+    def root(self) -> Element | None:
+        """The drawing; None for a plot."""
         return ElementTree.fromstring(self._svg) if self._svg else None
 
     @cached_property
     def name(self) -> str:
         """What the panel is called in its view, such as "radial curve"; "" for a plot."""
-        return self._root.get("aria-label", "") if self._root is not None else ""
+        return self.root.get("aria-label", "") if self.root is not None else ""
 
     @cached_property
     def _grows(self) -> bool:
         """Whether its letters grow as it shrinks (draw/flow.py)."""
-        return self._root is not None and "--shown:100vw" in self._root.get("style", "")
+        return self.root is not None and "--shown:100vw" in self.root.get("style", "")
 
     @property
     def least(self) -> float:
@@ -72,11 +73,11 @@ class SavedImage:
 
         Letters of a still grow as the still shrinks (draw/flow.py), until they would touch each other.
         """
-        if self._root is None:
+        if self.root is None:
             return LEAST_TEXT / _PLOTTED
         if not self._grows:
             return LEAST_TEXT / _SAVED
-        has_panel = any("data-panel" in part.attrib for part in self._root.iter())
+        has_panel = any("data-panel" in part.attrib for part in self.root.iter())
         return LEAST_TEXT / (_STILL_TEXT if has_panel else _READOUT_TEXT)
 
     def image(self, scale: float) -> str:
