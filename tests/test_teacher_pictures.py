@@ -146,10 +146,13 @@ def test_no_picture_of_an_unsolved_lesson_is_black_or_empty(path):
 def test_a_black_map_of_an_unwritten_function_would_be_seen():
     """And the greyed picture that stands in its place is neither."""
     photograph = np.random.default_rng(1).integers(0, 255, (90, 120, 3)).astype(np.uint8)
-    shown = side_by_side({"black": np.zeros((90, 120, 3), np.uint8), "yours": faded(photograph)})
+    shown = side_by_side({"black": np.zeros((90, 120, 3), np.uint8), '"yours"': faded(photograph)})
     cell = nbformat.v4.new_code_cell("shown")
     cell.outputs = [nbformat.v4.new_output("display_data", data=shown._repr_mimebundle_())]
-    assert [black_or_empty(one) for one in panels.panels(cell)] == [True, False]
+    saved = panels.panels(cell)
+    assert [black_or_empty(one) for one in saved] == [True, False]
+    assert [one.description for one in saved] == ['Pictures. From left to right: black; "yours".', '"yours"']
+    assert images_of(saved[1].image(1.25))[0][0] == '"yours"'
 
 
 # Whose function draws it ---------------------------------------------------------------------------------------------
