@@ -1,5 +1,9 @@
 """The demosaicing visualizer shows true pictures and true numbers, and marks where false colour must be."""
 
+import re
+import sys
+from types import SimpleNamespace
+
 import cv2
 import numpy as np
 import pytest
@@ -8,7 +12,8 @@ from camviz import mosaics
 from camviz.mosaics import BAYER, XTRANS
 from camviz.scenes import to_display, to_linear
 from camviz.scenes.photographs import photograph
-from camviz_school.course.material import module
+from camviz_school.course import notebooks
+from camviz_school.course.material import lessons_folder, module
 from camviz_school.views.demosaicing import LOUPE, DemosaicingView, _everywhere, nearest_carrier
 
 edge_green, malvar_green, mosaic = module("12").edge_green, module("12").malvar_green, module("12").mosaic
@@ -129,3 +134,16 @@ def test_a_right_mosaic_makes_the_same_picture(pattern, show):
     np.testing.assert_allclose(blurred.your_picture[0].astype(int), blurred.rebuilt, atol=1)
     wrong = view.but(your_mosaic=lambda picture, tile: mosaic(picture, tile[:, ::-1]))
     assert np.abs(wrong.your_picture[0].astype(int) - right).max() > 50
+
+
+def test_the_lesson_s_lines_for_a_raw_file_scale_it_from_0_to_1(monkeypatch):
+    (path,) = lessons_folder().glob("12_*.ipynb")
+    cells = "\n".join(cell.source for cell in notebooks.read(path).cells)
+    (code,) = re.findall(r"```python\n(import rawpy.*?)```", cells, re.DOTALL)
+    raw = SimpleNamespace(color_desc=b"RGBG", raw_pattern=np.array([[0, 1], [3, 2]]), white_level=16383)
+    raw.black_level_per_channel, raw.raw_image_visible = [512] * 4, np.full((6, 8), 512, np.uint16)
+    raw.raw_image_visible[2, 3] = 16383
+    monkeypatch.setitem(sys.modules, "rawpy", SimpleNamespace(imread=lambda name: raw))
+    names = {"mosaics": mosaics}
+    exec(code, names)
+    assert (names["mosaic"].min(), names["mosaic"].max(), names["picture"].shape) == (0, 1, (6, 8, 3))

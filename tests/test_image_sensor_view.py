@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.draw.marks import Dots
+from camviz.draw.marks import Discs
 from camviz.scenes import textured_scene, to_display
 from camviz.sensors import decibel, gliding, rolling_picture
 from camviz_school.course.material import module
@@ -108,7 +108,7 @@ def test_a_right_row_time_of_the_readers_lies_on_the_line(row_us):
     assert seconds == pytest.approx(1e-6 * row_us)
     assert f"{row_us:g} µs" in view.numbers()["row time, yours"]
     marks = view.figure().marks.panels()[view._clock.name].marks
-    (dots,) = (mark.points for mark in marks.of("orange") if isinstance(mark, Dots))
+    (dots,) = (mark.points for mark in marks.of("orange") if isinstance(mark, Discs))
     (start, end) = marks.points("orange thick")
     np.testing.assert_allclose(dots, np.linspace(start, end, len(dots)), atol=1e-6)
     assert view._clock.data(end)[0] == pytest.approx(480 * row_us / 1000)

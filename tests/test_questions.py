@@ -7,7 +7,8 @@ from unittest.mock import Mock
 import pytest
 
 from camviz.draw import prose
-from camviz_school.course.material import material
+from camviz_school.course import notebooks
+from camviz_school.course.material import lessons_folder, material
 from camviz_school.course.questions import Question, parse, predict_questions, question, questions, quiz_questions
 from camviz_school.widgets.question import QuestionPage, QuestionWidget, ask, quiz, score
 
@@ -276,3 +277,33 @@ def test_prose_in_a_terminal_keeps_code_and_drops_emphasis():
 def test_a_question_cannot_be_built_without_choices():
     with pytest.raises(ValueError, match="at least two choices"):
         Question("00.x", "quiz", "Why?", ())
+
+
+def above(question):
+    """All prose and saved text above a question."""
+    (path,) = lessons_folder().glob(f"{question[:2]}_*.ipynb")
+    cells = notebooks.read(path).cells
+    at = next(i for i, cell in enumerate(cells) if cell.source == f'ask("{question}")')
+    outputs = [str(out.get("data", {}).get("text/plain", "")) for cell in cells[:at] for out in cell.get("outputs", [])]
+    return " ".join([*(cell.source for cell in cells[:at]), *outputs])
+
+
+@pytest.mark.parametrize(
+    ("question", "words"),
+    [
+        ("12.measured", r"two thirds|interpolat|one of|each pixel|guess"),
+        ("12.shifted", r"becomes orange|change places|which colour sees|other columns"),
+        ("12.names", r"BGGR|second row|exchanged|Bayer(RG|BG)2"),
+        ("12.blur", r"too late|low-pass|four spots 0|coarse and soft|afterwards"),
+        ("13.white", r"greys come right|chosen patch,|pale|needs a matrix"),
+        ("13.grey_world", r"brown|turns \*blue|scene=|\.mean\(axis"),
+        ("13.tint", r"not enough|two dimensions|is one number|green side|beside the line"),
+        ("13.gamma", r"encoded as a rule|linear values|\*\*linear|before the balance"),
+        ("13.metamer", r"no matrix|cannot be told|twin|Luther|below about"),
+        ("13.infrared", r"IR-cut|fade towards|near infrared"),
+        ("15.light", r"Photon transfer[^✗]*on the card"),
+        ("15.one_frame", r"K from the curve"),
+    ],
+)
+def test_nothing_above_a_question_answers_it(question, words):
+    assert re.search(words, above(question), 0 if question.startswith("12") else re.IGNORECASE) is None

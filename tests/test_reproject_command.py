@@ -1,5 +1,9 @@
 """`camviz reproject` takes pictures through other lenses, or says in one sentence why not and writes nothing."""
 
+import os
+import re
+import shlex
+import shutil
 from importlib.util import find_spec
 from math import atan, degrees
 from pathlib import Path
@@ -13,6 +17,8 @@ from hypothesis import strategies as st
 
 from camviz.panoramas.projections import PROJECTIONS, across_deg, projection
 from camviz_clinic.commands.command import main
+from camviz_school.course import notebooks
+from camviz_school.course.material import lessons_folder
 
 DATA = Path(__file__).parent / "data"
 EARTH = Path(find_spec("pyvista").submodule_search_locations[0]) / "examples" / "2k_earth_daymap.jpg"
@@ -208,3 +214,22 @@ def test_a_file_without_a_size_takes_that_of_the_picture_it_belongs_to(room, sid
     assert main(["reproject", "sky.png", "-o", "out.png", *words[side]]) == 0
     if side == "to":
         assert cv2.imread("out.png").shape == (64, 128, 3)
+
+
+@pytest.mark.thorough
+def test_the_commands_of_lesson_10_run_as_they_are_written(tmp_path, monkeypatch):
+    samples = Path(os.environ.get("CAMVIZ_SAMPLES", "nowhere")) / "opencv-samples"
+    if not samples.is_dir():
+        pytest.skip("CAMVIZ_SAMPLES does not name a folder with OpenCV's samples")
+    monkeypatch.chdir(tmp_path)
+    (lesson,) = lessons_folder().glob("10_*.ipynb")
+    text = "\n".join(cell.source for cell in notebooks.read(lesson).cells)
+    calibrate, reproject = sorted(re.findall(r"`camviz ([^`]+)`", text))
+    Path("pictures").mkdir()
+    for number in range(1, 7):
+        shutil.copy(samples / f"left0{number}.jpg", "pictures")
+    assert main(shlex.split(calibrate)) == 0
+    assert not cv2.FileStorage("camera.yaml", cv2.FILE_STORAGE_READ).getNode("xi").empty()
+    cv2.imwrite("earth.jpg", np.random.default_rng(0).integers(0, 255, (180, 360, 3), dtype=np.uint8))
+    assert main(shlex.split(reproject)) == 0
+    assert cv2.imread("window.png").std() > 5  # of a panorama of noise

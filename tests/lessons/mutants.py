@@ -11,17 +11,18 @@ from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass, field
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from mutation import mutants
-from quoting import HERE, LESSONS
 
 from camviz_school.course import notebooks
 from camviz_school.course.checks import judge
+from camviz_school.course.material import lessons_folder
 from camviz_school.course.trials import Exercise, quiet
 
-TABLES = HERE / "equivalent_mutants"
+TABLES = Path(__file__).parent / "equivalent_mutants"
 
 # What is equivalent, and says so -------------------------------------------------------------------------------------
 
@@ -56,7 +57,7 @@ def never_negative(exercise: Exercise) -> list[str]:
 @cache
 def _lesson(number: str) -> tuple[dict[str, str], dict[str, Any]]:
     """The solutions of a lesson, and what its cells define for them."""
-    (path,) = LESSONS.glob(f"{number}_*.ipynb")
+    (path,) = lessons_folder().glob(f"{number}_*.ipynb")
     notebook = notebooks.read(path)
     solutions = notebooks.solutions(notebook)
     namespace: dict[str, Any] = {"np": np, "__name__": "lesson"}

@@ -7,15 +7,15 @@ import re
 
 import numpy as np
 import pytest
-from quoting import HERE, LESSONS
 
 from camviz_school.course import notebooks
 from camviz_school.course.checks import judge
 from camviz_school.course.exercises import exercises
+from camviz_school.course.material import lessons_folder
 from camviz_school.course.trials import HINTS
 
 ADVERSARIES = 8
-HELD = [path.name.split("_")[1] for path in sorted(HERE.glob("test_[0-9][0-9]_*.py"))]
+HELD = [path.name[:2] for path in sorted(lessons_folder().glob("*.ipynb"))]
 ALL = [one for number in HELD for one in exercises(number).values()]
 EACH = pytest.mark.parametrize("one", ALL, ids=lambda one: one.name)
 GAP = "___"
@@ -23,7 +23,7 @@ GAP = "___"
 
 def solution_of(one):
     number = one.name.partition(".")[0]
-    (path,) = LESSONS.glob(f"{number}_*.ipynb")
+    (path,) = lessons_folder().glob(f"{number}_*.ipynb")
     return notebooks.solutions(notebooks.read(path))[one.name]
 
 
@@ -42,7 +42,7 @@ def seeds(thorough):
 
 @pytest.mark.parametrize("number", HELD)
 def test_exercises_are_numbered_as_they_stand_on_the_sheet(number):
-    (path,) = LESSONS.glob(f"{number}_*.ipynb")
+    (path,) = lessons_folder().glob(f"{number}_*.ipynb")
     cells = notebooks.read(path).cells
     stubs = [notebooks.exercise_of(cell) for cell in cells if "stub" in cell.metadata.get("tags", [])]
     assert stubs == list(exercises(number))
@@ -111,7 +111,7 @@ def test_three_hints_lead_on_and_only_the_last_shows_the_solution_s_line_with_a_
 @EACH
 def test_the_notebook_gives_what_the_exercise_says_it_gives(one):
     number = one.name.partition(".")[0]
-    (path,) = LESSONS.glob(f"{number}_*.ipynb")
+    (path,) = lessons_folder().glob(f"{number}_*.ipynb")
     notebook = notebooks.read(path)
     stub, check, _ = notebooks.exercise_cells(notebook)[one.name]
     saved = "".join(str(output.get("data", {}).get("text/plain", "")) for output in check.outputs)

@@ -14,7 +14,6 @@ import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from quoting import LESSONS
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tools/website"))
 
@@ -24,8 +23,9 @@ from camviz.draw.picture import Picture
 from camviz.widgets.explorer import Explorer
 from camviz_school.course import notebooks
 from camviz_school.course.exercises import exercises
+from camviz_school.course.material import lessons_folder
 
-PATHS = [path for path in sorted(LESSONS.glob("*.ipynb")) if "attempt(" in path.read_text(encoding="utf-8")]
+PATHS = [path for path in sorted(lessons_folder().glob("*.ipynb")) if "attempt(" in path.read_text(encoding="utf-8")]
 VISIBLE = 5e-4
 """Of a picture's pixels: as many as one moved marker covers."""
 
