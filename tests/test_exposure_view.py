@@ -3,24 +3,7 @@
 import numpy as np
 import pytest
 
-from camviz_school.views.exposure import FULL_WELL_E, ExposureView, seconds
-
-BASE = ExposureView(f_number=2.0, vignetting="cos⁴ and rim", metering="average")
-ENDS = [
-    (name, value)
-    for name, control in ExposureView.controls().items()
-    for value in (control.choices or (control.low, control.high))
-]
-
-
-@pytest.mark.parametrize(("name", "value"), ENDS)
-def test_every_end_of_every_control_draws_and_changes_what_is_seen(name, value):
-    base = BASE if name != "shutter" else BASE.but(metering="manual")
-    if getattr(base, name) == value:
-        return
-    first, other = base.figure(draft=True), base.but(**{name: value}).figure(draft=True)
-    assert (first.body, first.photographs) != (other.body, other.photographs)
-    assert "nan" not in other.body.lower()
+from camviz_school.views.exposure import FULL_WELL_E, ExposureView
 
 
 @pytest.mark.parametrize("change", [{"f_number": 8.0}, {"shutter": -11.0}, {"light_ev": 13.0}])
@@ -28,16 +11,10 @@ def test_two_stops_less_by_any_knob_are_a_quarter_of_the_light(change):
     one = ExposureView(f_number=4.0, shutter=-9.0, light_ev=15.0)
     other = one.but(**change)
     assert other.electrons_of_white == pytest.approx(one.electrons_of_white / 4)
-
-
-def test_gain_frees_no_electrons_and_scales_the_numbers():
-    one, more = ExposureView(shutter=-13.0), ExposureView(shutter=-13.0, iso=2.0)
+    sunny_16 = ExposureView(f_number=16.0, shutter=-7.0)
+    assert sunny_16.electrons_of_white == pytest.approx(FULL_WELL_E)
+    more = one.but(iso=2.0)  # gain frees no electrons and scales the numbers
     assert more.electrons_of_white == pytest.approx(one.electrons_of_white)
-    assert more.recorded(draft=True).mean() == pytest.approx(4 * one.recorded(draft=True).mean(), rel=0.02)
-
-
-def test_full_sun_by_the_sunny_16_rule_makes_white_white():
-    assert ExposureView(f_number=16.0, shutter=-7.0).electrons_of_white == pytest.approx(FULL_WELL_E)
 
 
 @pytest.mark.parametrize("subject", ["garden", "snow", "coal"])
@@ -58,26 +35,15 @@ def test_the_corners_of_the_picture_follow_the_fall_off():
     assert dark[middle].mean() == pytest.approx(plain[middle].mean(), rel=0.01)
 
 
-def test_stopping_down_removes_the_rim_and_leaves_the_fourth_power():
+def test_stopping_down_leaves_the_fourth_power():
     corner = np.array(21.6)
     wide, narrow = (ExposureView(vignetting="cos⁴ and rim", f_number=N).falloff(corner) for N in (1.4, 5.6))
     assert wide < 0.7 * narrow
     assert narrow == pytest.approx(np.cos(np.arctan(21.6 / 35)) ** 4)
 
 
-def test_a_reader_s_function_is_drawn_in_orange_and_never_raises():
+def test_a_readers_function_is_drawn_where_it_answers():
     view = ExposureView(yours=lambda r, v: np.cos(np.arctan(r / v)) ** 4, vignetting="cos⁴")
-    assert "orange" in view.figure(draft=True).svg()
-    assert "ZeroDivisionError" in view.but(yours=lambda r, v: 1 / 0).figure(draft=True).svg()
-    assert "yours appears here" in view.but(yours=lambda r, v: None).figure(draft=True).svg()
-
-
-def test_times_are_written_as_photographers_do():
-    assert seconds(1 / 125) == "1/125 s"
-    assert seconds(0.5) == "0.5 s"
-
-
-@pytest.mark.parametrize("bad", [{"f_number": 0.0}, {"shutter": np.nan}, {"subject": "sea"}, {"metering": "spot"}])
-def test_a_state_that_makes_no_sense_is_refused_by_name(bad):
-    with pytest.raises(ValueError, match=next(iter(bad))):
-        ExposureView(**bad)
+    marks = view.figure(draft=True).marks.panels()["corners"].marks
+    own, now = (marks.of(style)[0].lines[0] for style in ("orange", "ink thick"))
+    np.testing.assert_allclose(own, now[::3], atol=1e-6)

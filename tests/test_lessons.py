@@ -20,6 +20,7 @@ from camviz_school.course import notebooks, saved_outputs
 from camviz_school.course.exercises import Tutor, exercises
 from camviz_school.course.lesson_rules import SETUP, complaints
 from camviz_school.course.material import module
+from camviz_school.teaching import panels
 from camviz_school.teaching.edition import mark_solution, teacher_edition, write_teacher_edition
 
 lesson05 = module("05")
@@ -355,12 +356,11 @@ def test_every_lesson_s_saved_outputs_are_fresh_and_static(path):
     assert saved_outputs.is_fresh(notebook)
     assert "application/vnd.jupyter.widget-view+json" not in path.read_text(encoding="utf-8")
     assert "pictures take their place" not in path.read_text(encoding="utf-8")  # saved with the real photographs
-    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
-    shown = "".join(output.get("data", {}).get("text/html", "") for output in outputs)
-    images = re.findall(r'src="data:image/svg\+xml;base64,([^"]+)"', shown)
-    assert images
-    for image in images:
-        ElementTree.fromstring(b64decode(image))  # a browser shows nothing of an image that is not well-formed
+    images = [source for cell in notebook.cells for _, source in saved_outputs.images(cell)]
+    drawings = [source for source in images if source.startswith("data:image/svg")]
+    assert drawings
+    for drawing in drawings:  # a browser shows nothing of an image that is not well-formed
+        ElementTree.fromstring(b64decode(drawing.partition(",")[2]))
 
 
 @EACH
@@ -368,12 +368,12 @@ def test_no_saved_picture_is_black_or_of_any_one_colour(path):
     """Where a function is not written yet, the right picture stands in grey (`camviz.views.yours.faded`)."""
     plain = []
     for cell in notebooks.read(path).cells:
-        for output in cell.get("outputs", []):
-            html = output.get("data", {}).get("text/html", "")
-            vectors = re.findall(r"data:image/svg\+xml;base64,([\w+/=]+)", html)
-            drawn = [html, *(b64decode(one).decode() for one in vectors)]
-            for data in re.findall(r"data:image/(?:png|jpeg|webp);base64,([\w+/=]+)", "".join(drawn)):
-                pixels = np.asarray(Image.open(BytesIO(b64decode(data))).convert("RGB"), dtype=float)
+        for shown in panels.panels(cell):
+            parts = [] if shown.root is None else [part.get("href", "") for part in shown.root.iter()]
+            photographs = [part for part in parts if part.startswith("data:")]
+            for address in [shown.source] if shown.root is None else photographs:
+                data = b64decode(address.partition(",")[2])
+                pixels = np.asarray(Image.open(BytesIO(data)).convert("RGB"), dtype=float)
                 if pixels.size > 1200 and np.ptp(pixels) < 8:  # marks and colour bars may be smaller
                     plain.append((cell.id, pixels.shape))
     assert plain == []

@@ -6,22 +6,6 @@ import pytest
 from camviz_clinic.measuring.sharpness import SlantedEdge
 from camviz_school.views.sharpness import FIELD_UM, SharpnessView
 
-BASE = SharpnessView(f_number=4.0, defocus_um=10.0)
-ENDS = [
-    (name, end)
-    for name, control in SharpnessView.controls().items()
-    for end in ((control.low, control.high) if control.low is not None else (True, False))
-]
-
-
-@pytest.mark.parametrize(("name", "end"), ENDS)
-def test_every_end_of_every_control_draws_and_changes_what_is_seen(name, end):
-    if getattr(BASE, name) == end:
-        return
-    first, other = BASE.figure(draft=True), BASE.but(**{name: end}).figure(draft=True)
-    assert (first.body, first.photographs) != (other.body, other.photographs)
-    assert "nan" not in other.body.lower()
-
 
 @pytest.mark.parametrize(
     "state",
@@ -49,13 +33,11 @@ def test_the_numbers_are_those_of_the_optics():
     assert numbers["defocus disc"] == "5.0 µm across"
     assert numbers["lens passes up to"] == "250 cycles/mm"
     assert numbers["Nyquist frequency"] == "100 cycles/mm"
-
-
-def test_the_picture_shows_the_same_field_at_every_pitch():
-    for pitch in (1.0, 4.0, 12.0):
+    for pitch in (1.0, 4.0, 12.0):  # the picture shows the same field at every pitch
         height, width, _ = SharpnessView(pitch_um=pitch).image().shape
-        assert width * pitch == pytest.approx(FIELD_UM[0], abs=pitch)
-        assert height * pitch == pytest.approx(FIELD_UM[1], abs=pitch)
+        assert (width * pitch, height * pitch) == pytest.approx(FIELD_UM, abs=pitch)
+    red_sharp = SharpnessView(defocus_um=30.0, axial_um=30.0)  # red focuses farther than green, and blue nearer
+    assert [round(red_sharp.disc_mm(k) * 5600) for k in (0, 1, 2)] == [0, 30, 60]
 
 
 def test_stopping_down_mends_axial_colour_and_not_lateral_colour():
@@ -70,30 +52,15 @@ def test_stopping_down_mends_axial_colour_and_not_lateral_colour():
     assert fringe(SharpnessView(f_number=2.8)) == 0
 
 
-def test_red_focuses_farther_than_green_and_blue_nearer():
-    red_sharp = SharpnessView(defocus_um=30.0, axial_um=30.0)
-    assert [round(red_sharp.disc_mm(k) * 5600) for k in (0, 1, 2)] == [0, 30, 60]
-
-
 def right(per_mm, f_number, wavelength_mm, pitch_mm):
     s = np.minimum(per_mm * wavelength_mm * f_number, 1)
     return 2 / np.pi * (np.arccos(s) - s * np.sqrt(1 - s**2)) * np.abs(np.sinc(per_mm * pitch_mm))
 
 
-def test_a_reader_s_function_is_drawn_in_orange_and_never_raises():
+def test_a_readers_function_lies_on_the_curve_of_the_system():
     view = SharpnessView(yours=right, f_number=8.0, pitch_um=5.0)
     f = np.linspace(0, 200, 41)
     np.testing.assert_allclose(right(f, 8.0, 550e-6, 0.005), view.system(f), atol=1e-6)
-    assert 'class="orange' in view.figure(draft=True).svg()
-    wrong = view.but(yours=lambda *given: 1 / 0)
-    assert "ZeroDivisionError" in wrong.figure(draft=True).svg()
-    empty = view.but(yours=lambda *given: None)
-    assert "yours appears here" in empty.figure(draft=True).svg()
-    assert "orange dots" not in empty.figure(draft=True).svg()
-    assert "yours" not in SharpnessView().figure(draft=True).body
-
-
-@pytest.mark.parametrize("bad", [{"f_number": 0.0}, {"pitch_um": 0.1}, {"wavelength_nm": -1.0}, {"defocus_um": np.nan}])
-def test_a_state_that_makes_no_sense_is_refused_by_name(bad):
-    with pytest.raises(ValueError, match=next(iter(bad))):
-        SharpnessView(**bad)
+    marks = view.figure(draft=True).marks
+    own, system = (marks.of(style)[0].lines[0] for style in ("orange", "ink thick"))
+    np.testing.assert_allclose(own[:, 1], np.interp(own[:, 0], *system.T), atol=0.5)

@@ -71,21 +71,6 @@ def test_a_deck_loads_nothing_and_names_no_other_address(path):
     assert len(set(re.findall(r'<section[^>]* id="(s\d+)"', page))) == len(made(path))
 
 
-def test_lesson_05_says_what_it_should():
-    lesson = next(path for path in LESSONS if path.name.startswith("05"))
-    found = made(lesson)
-    assert "Why do straight walls come out bent" in found[0].body
-    kinds = [one.kind for one in found]
-    assert {"picture", "question", "key", "reply", "equation", "misconception", "claim", "exercise", "recap"} <= set(
-        kinds
-    )
-    assert "negative is barrel" in next(one.heading for one in found if one.kind == "misconception")
-    equation = next(one for one in found if one.kind == "equation")
-    assert equation.body.count("<math") == 2
-    page = deck.deck(notebooks.read(lesson))
-    assert "<h2>The left lens folds inside its own picture</h2>" in page
-
-
 def test_a_pretest_is_asked_and_not_answered(monkeypatch):
     monkeypatch.setattr(parts, "is_pretest", lambda cell: cell.source.startswith("quiz("))
     header = nbformat.v4.new_markdown_cell("# 05 · A\n\n**Why?**")
@@ -101,33 +86,6 @@ def test_a_long_equation_is_broken_and_a_short_one_is_large():
     assert slides._equation(matrix).count("<math") == 1
 
 
-def test_a_heading_is_a_whole_thought_or_none():
-    assert slides._as_heading("Notice that *all* lines are straight: look.") == "<em>All</em> lines are straight: look"
-    assert slides._as_heading(f"One two three four five: {'word ' * 20}") == "One two three four five"
-    assert slides._as_heading("word " * 30) == ""
-
-
-# Nothing that a slide has not --------------------------------------------------------------------------------------
-
-ORDER = re.compile(
-    r"^\W*(?:Then |Try it: )?(?:Change|Choose|Click|Drag|Move|Open|Press|Pull|Step|Switch)\b|<strong>\+ "
-)
-
-
-@EACH
-def test_no_claim_tells_to_press_or_to_move_something(path):
-    claims = [one.body.removeprefix("<p>") for one in made(path) if one.kind == "claim"]
-    assert [one for one in claims if ORDER.search(re.sub(r"^<strong>(?!\+)", "", one))] == []
-
-
-@EACH
-def test_no_text_breaks_off_at_a_colon_and_none_shows_its_markup(path):
-    for one in made(path):
-        text = re.sub(r"<(?:math|pre|code).*?</(?:math|pre|code)>|<[^>]*>", "", one.body + one.heading, flags=re.DOTALL)
-        assert not re.search(r"\*\*|`", text), text
-        assert one.kind not in ("claim", "misconception") or not re.search(r":\s*</p>$", one.body), one.body
-
-
 def test_an_exercise_asks_even_where_its_text_is_long():
     given = "You get windows of five pixels, each centred on a red one."
     rule = "For the middle row let bend be 2c − a − e, for the middle column the same, and so on."
@@ -137,15 +95,8 @@ def test_an_exercise_asks_even_where_its_text_is_long():
     assert slides._asked_for(["How far does it land?", "By hand: 3 px."], 30) == "How far does it land?"
 
 
-def test_what_is_below_by_a_number_or_in_a_fraction_is_no_picture():
+def test_only_what_is_below_in_the_lesson_is_a_picture():
     picture = slides.Slide("picture", "", "A")
     texts = ("Divide above and below by 2.", "The picture below the code is wrong.")
     shown = [next(slides._pointing([slides.Slide("claim", "", "", text), picture])).body for text in texts]
     assert shown == [texts[0], f"{texts[1]}<p class='where'>Below in the lesson: slide 2.</p>"]
-
-
-def test_equations_are_parted_where_they_have_a_gap():
-    three = r", \quad ".join(
-        f"\\text{{variance of the means, {name}}} = a + b" for name in ("rows", "columns", "pixels")
-    )
-    assert slides._equation(three).count("<math") == 3

@@ -42,7 +42,7 @@ def test_a_dragged_end_moves_its_own_line_and_no_other(handle, moves):
 
 @pytest.mark.parametrize("aside", [-3.0, 0.0, 2.0])
 @pytest.mark.parametrize("turn_deg", [-25.0, 0.0, 30.0])
-def test_a_hand_can_take_each_end_although_two_lines_end_in_the_corner_of_both_walls(turn_deg, aside):
+def test_a_hand_can_take_each_of_the_lines_ends(turn_deg, aside):
     marks = VanishingView(turn_deg=turn_deg, aside=aside).figure(draft=True).marks
     hands = [group.marks.points("card").mean(axis=0) for group in marks.groups("end")]
     assert len(hands) in (4, 8)
@@ -50,7 +50,7 @@ def test_a_hand_can_take_each_end_although_two_lines_end_in_the_corner_of_both_w
     assert min(between) > 8  # of 13 that each reaches
 
 
-def test_a_dragged_end_changes_the_focal_length_and_where_the_lines_meet():
+def test_a_dragged_end_changes_the_focal_length():
     moved = VanishingView().dragged("end1", 0, 0, *(PAPER.scale * (0, 4)))
     assert np.linalg.norm(moved.pixels["x"] - VanishingView().pixels["x"]) > 10
     assert abs(moved.focal / moved.camera.intrinsics.fx - 1) > 0.01
@@ -68,10 +68,9 @@ def test_where_there_is_no_focal_length_the_numbers_say_why(state, reason):
     view = VanishingView(**state)
     assert np.isnan(view.focal)
     assert view.numbers()["focal length"] == f"none: {reason}"
-    assert "nan" not in view.figure(draft=True).body.lower()
 
 
-def test_the_horizon_is_there_while_a_point_is_at_infinity_and_not_where_a_wall_is_unseen():
+def test_the_horizon_is_there_while_a_point_is_at_infinity():
     squarely = VanishingView(aside=-3.0, turn_deg=42.0)
     assert np.isnan(squarely.pixels["x"]).all()
     assert squarely.horizon == pytest.approx((239.5, 0.0), abs=1e-6)
@@ -79,17 +78,6 @@ def test_the_horizon_is_there_while_a_point_is_at_infinity_and_not_where_a_wall_
     unseen = VanishingView(turn_deg=42.0)
     assert np.isnan(unseen.horizon).all()
     assert unseen.numbers()["blue lines meet"] == "not in the picture"
-
-
-@pytest.mark.parametrize("view", [VanishingView, StaffView])
-def test_a_wrong_name_of_a_panel_is_refused(view):
-    with pytest.raises(ValueError, match="panels must be"):
-        view(panels="numbers")
-
-
-def test_ends_that_are_no_numbers_are_refused():
-    with pytest.raises(ValueError, match="moved must be"):
-        VanishingView(moved=((np.nan, 0.0),) * 8)
 
 
 @pytest.mark.parametrize("distance", [5.0, 12.0, 40.0])

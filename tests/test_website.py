@@ -291,6 +291,9 @@ def test_pictures_with_one_content_are_one_file(tmp_path: Path) -> None:
     html = pictures.outside(image + image, tmp_path, "../p")
     assert len(list(tmp_path.iterdir())) == 1
     assert html.count('loading="lazy"') == 2
+    drawn = FrustumView().figure()
+    _, _, width, height = drawn.tiles[0].cell  # known before it is fetched
+    assert f' width="{width:g}" height="{height:g}"' in pictures.outside(drawn.figure(), tmp_path, "../p")
 
 
 def test_the_pages_script_is_the_notebooks_own() -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from camviz_school.course import minutes, questions
+from camviz_school.course import minutes, questions, saved_outputs
 from camviz_school.course.minutes import Cell, DeeperSection
 
 Notebook = Any
@@ -27,7 +27,6 @@ BEFORE_THE_VIEW = 2
 
 _IDEAS = re.compile(r"^\*\*Ideas:\*\* (.+)$", re.MULTILINE)
 _ASKS = re.compile(r"\*About (\d+) minutes\. Asks for: [^*]+\*")
-_IMAGE = re.compile(r'<img (?!alt="key")')  # a tile called key names the lines of the panel before it
 
 
 def complaints(notebook: Notebook, number: str) -> list[str]:
@@ -124,9 +123,8 @@ def _first_views(core: list[Cell]) -> list[Cell]:
 
 
 def _panels(view: Cell) -> int:
-    """How many panels the saved picture of a cell has."""
-    html = "".join("".join(output.get("data", {}).get("text/html", "")) for output in view.get("outputs", []))
-    return len(_IMAGE.findall(html))
+    """How many panels the saved picture of a cell has; a tile called key names the lines of the panel before it."""
+    return sum(words != "key" for words, _ in saved_outputs.images(view))
 
 
 def _pictures(cell: Cell) -> bool:

@@ -6,6 +6,7 @@ import hashlib
 import json
 import re
 from copy import deepcopy
+from html.parser import HTMLParser
 from pathlib import Path
 
 from camviz_school.course import glossary
@@ -86,3 +87,30 @@ def _steady_id(cell: Cell, taken: set[str]) -> str:
     while f"c-{text}-{number}" in taken:
         number += 1
     return f"c-{text}-{number}"
+
+
+def images(cell: Cell) -> list[tuple[str, str]]:
+    """What each image among a cell's saved outputs says to someone who cannot see it, and its data address."""
+    outputs = cell.get("outputs", []) if cell.cell_type == "code" else []
+    return images_of("".join("".join(output.get("data", {}).get("text/html", "")) for output in outputs))
+
+
+def images_of(html: str) -> list[tuple[str, str]]:
+    """As `images`, of a piece of HTML."""
+    reader = _ImageReader()
+    reader.feed(html)
+    return reader.found
+
+
+class _ImageReader(HTMLParser):
+    """Collects the words and data addresses of images."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[tuple[str, str]] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        named = dict(attrs)
+        source = named.get("src") or ""
+        if tag == "img" and source.startswith("data:"):
+            self.found.append((named.get("alt") or "", source))

@@ -7,9 +7,12 @@ from base64 import b64decode, b64encode
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from html import unescape
+from html import escape, unescape
 from itertools import combinations, pairwise
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
+from camviz_school.course import saved_outputs
 from camviz_school.course.notebooks import Cell
 
 SLIDE = 1280.0
@@ -25,9 +28,6 @@ LARGEST = 1.9
 
 _SAVED, _STILL_TEXT, _READOUT_TEXT = 12.0, 14.4, 13.0  # units of a panel's smallest letters: at first, and at most
 _PLOTTED = 13.9  # pixels of matplotlib's 10 points at 100 dots an inch
-_IMAGE = re.compile(r'<img\b[^>]*?\salt="(?P<alt>[^"]*)"[^>]*?\ssrc="(?P<source>data:[^"]+)"')
-_NAME = re.compile(r'<svg\b[^>]*?\baria-label="([^"]*)"')
-_SIZE = re.compile(r'<svg\b[^>]*?\bwidth="(?P<width>[\d.]+)"[^>]*?\bheight="(?P<height>[\d.]+)"')
 
 
 @dataclass(frozen=True)
@@ -43,10 +43,9 @@ class SavedImage:
         if self.source.startswith("data:image/png;base64,"):
             head = b64decode(self.source.partition(",")[2][:64])
             return float(int.from_bytes(head[16:20], "big")), float(int.from_bytes(head[20:24], "big"))
-        found = _SIZE.search(self._svg)
-        if not found:
+        if self.root is None or not {"width", "height"} <= self.root.attrib.keys():
             raise ValueError(f"a picture must be a PNG or an SVG with a width and a height, got {self.source[:40]!r}")
-        return float(found["width"]), float(found["height"])
+        return float(self.root.attrib["width"]), float(self.root.attrib["height"])
 
     @cached_property
     def _svg(self) -> str:
@@ -54,10 +53,19 @@ class SavedImage:
         return b64decode(data).decode() if kind == "data:image/svg+xml;base64" else ""
 
     @cached_property
+    def root(self) -> Element | None:
+        """The drawing; None for a plot."""
+        return ElementTree.fromstring(self._svg) if self._svg else None
+
+    @cached_property
     def name(self) -> str:
         """What the panel is called in its view, such as "radial curve"; "" for a plot."""
-        found = _NAME.search(self._svg)
-        return unescape(found[1]) if found else ""
+        return self.root.get("aria-label", "") if self.root is not None else ""
+
+    @cached_property
+    def _grows(self) -> bool:
+        """Whether its letters grow as it shrinks (draw/flow.py)."""
+        return self.root is not None and "--shown:100vw" in self.root.get("style", "")
 
     @property
     def least(self) -> float:
@@ -65,29 +73,28 @@ class SavedImage:
 
         Letters of a still grow as the still shrinks (draw/flow.py), until they would touch each other.
         """
-        if not self._svg:
+        if self.root is None:
             return LEAST_TEXT / _PLOTTED
-        if "--shown:100vw" not in self._svg:
+        if not self._grows:
             return LEAST_TEXT / _SAVED
-        return LEAST_TEXT / (_STILL_TEXT if "data-panel" in self._svg else _READOUT_TEXT)
+        has_panel = any("data-panel" in part.attrib for part in self.root.iter())
+        return LEAST_TEXT / (_STILL_TEXT if has_panel else _READOUT_TEXT)
 
     def image(self, scale: float) -> str:
         """The panel as HTML at a scale, its letters as large as that scale asks for on every screen and on paper."""
         width, height = self.size
         source = self.source
-        if "--shown:100vw" in self._svg:
+        if self._grows:
             larger = f"--shown:{scale * width:.1f}px;--camviz-scale:{LEAST_TEXT / _SAVED:.4f}"
             drawn = self._svg.replace("--shown:100vw", larger, 1)
             source = f"data:image/svg+xml;base64,{b64encode(drawn.encode()).decode()}"
         sizes = f"width:{_units(scale * width)};height:{_units(scale * height)}"
-        return f'<img alt="{self.description}" style="{sizes}" src="{source}">'
+        return f'<img alt="{escape(self.description)}" style="{sizes}" src="{source}">'
 
 
 def panels(cell: Cell) -> list[SavedImage]:
     """All images among a code cell's saved outputs, in their order."""
-    outputs = cell.get("outputs", []) if cell.cell_type == "code" else []
-    pages = ["".join(output.get("data", {}).get("text/html", "")) for output in outputs]
-    return [SavedImage(found["source"], found["alt"]) for page in pages for found in _IMAGE.finditer(page)]
+    return [SavedImage(source, words) for words, source in saved_outputs.images(cell)]
 
 
 @dataclass(frozen=True)

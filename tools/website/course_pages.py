@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import re
 from html import escape
 from pathlib import Path
 
 import pictures
 
 from camviz.draw import prose
-from camviz_school.course import paths
+from camviz_school.course import paths, saved_outputs
 from camviz_school.course.catalogue import Lesson, catalogue
 from camviz_school.course.glossary import Term, glossary
 from camviz_school.course.material import lesson_paths
@@ -79,11 +78,9 @@ def _parts(lessons: list[Lesson]) -> list[tuple[str, str, list[Lesson]]]:
 def _first_picture(path: Path, folder: Path) -> str:
     """The address of the first panel of a lesson's first picture, from the top of the site; "" without one."""
     for cell in read(path).cells:
-        for output in cell.get("outputs", []):
-            first = re.search(r"<figure.*?(<img[^>]*>)", output.get("data", {}).get("text/html", ""), re.DOTALL)
-            if first:
-                found = re.search(r'src="([^"]+)"', pictures.outside(first[1], folder, folder.name))
-                return found[1] if found else ""
+        for _, source in saved_outputs.images(cell):
+            if source.startswith("data:image/svg+xml"):
+                return f"{folder.name}/{pictures.kept(source, folder).name}"
     return ""
 
 
