@@ -28,9 +28,9 @@ FOLDER = Path(__file__).parent / "data/approved"
 DPI = 48
 MAX_MEAN_DIFFERENCE = 0.005
 """Of the whole picture, as a part of the way from black to white."""
-MAX_BLOCK_DIFFERENCE = 0.08
-"""Of the block of BLOCK_PX × BLOCK_PX that differs most. Letters that are not hinted differ by 0.04."""
-BLOCK_PX = 12
+MAX_BLOCK_DIFFERENCE = 0.10
+"""Of the block of BLOCK_PX × BLOCK_PX that differs most. Letters that are not hinted differ by 0.07."""
+BLOCK_PX = 8
 
 PICTURES = {
     "distortion": DistortionView,
