@@ -74,6 +74,8 @@ def test_the_chosen_bar_alone_is_orange():
     panel, values = Bars()._bars, np.array([1.0, np.nan, 2.0, 1.5])
     drawn = bars_of(panel, values, 2)
     assert {path.class_: len(path.lines) for path in drawn} == {"fill-blue": 2, "fill-orange": 1}
+    (orange,) = drawn.of("fill-orange")
+    assert panel.data(orange.lines[0])[:, 0].mean() == pytest.approx(3)
     assert [text.words for text in figures_on(panel, values).texts()] == ["1.00", "2.00", "1.50"]
 
 
