@@ -81,6 +81,11 @@ def figure(name: str) -> Picture:
     return STATES[name]().figure()
 
 
+def written(picture: Picture) -> str:
+    """All words of a picture, in the order in which they are drawn."""
+    return " ".join(text.words for text in picture.marks.texts())
+
+
 STATES: dict[str, Callable[[], View]] = {
     **{name: view for name, view in sorted(classes().items()) if _needs_nothing(view)},
     **{f"clinic {name}": clinic(name) for name in VIEWS},

@@ -104,21 +104,11 @@ def test_every_frame_is_what_the_view_draws_for_its_values(tmp_path, unit):
             assert frame["frame"]["error"] == ""
         assert frame["values"] == values or values["size"] > 8
     assert len({tuple(values.values()) for values, _ in found}) == made.positions
-
-
-def test_a_state_that_cannot_be_drawn_is_told_in_words(tmp_path):
-    made = record(explore(Toy(), "size"), tmp_path)
-    (told,) = [frame["frame"]["error"] for values, frame in states(made) if values["size"] == 10]
-    assert told == "size must be at most 8"
-
-
-def test_axes_are_recorded_alone_or_those_named_together(tmp_path):
-    made = record(explore(Toy(), together=("height", "colour")), tmp_path, budget=Budget(slider=6, grid=4))
-    found = [values for values, _ in states(made)]
-    assert {(v["height"], v["colour"]) for v in found} >= {(h, c) for h in (0, 1) for c in ("red", "blue", "green")}
-    assert {v["lit"] for v in found} == {True, False}
-    assert all(v["size"] == 1.0 for v in found if v["height"] or v["colour"] != "red" or not v["lit"])
-    assert made.counts == {"size": 6, "height": 6, "colour": 3, "lit": 2}
+    (error,) = {frame["frame"]["error"] for values, frame in found if values["size"] == 10}
+    assert error == "size must be at most 8"  # a state that cannot be drawn
+    places = [values for values, _ in found]
+    assert {(v["height"], v["lit"]) for v in places} >= {(h, lit) for h in (0, 1) for lit in (True, False)}
+    assert all(v["size"] == 1.0 for v in places if v["height"] or v["colour"] != "red")  # axes alone
 
 
 def test_a_panel_that_a_button_opens_is_recorded_with_each_control(tmp_path):
@@ -136,7 +126,7 @@ def test_a_panel_that_a_button_opens_is_recorded_with_each_control(tmp_path):
         assert frame["frame"]["described"] == drawn.figure().description
 
 
-def test_a_sliders_positions_are_ends_first_value_and_steps():
+def test_a_sliders_positions_hold_both_ends_and_the_first():
     axis = Axis.slider("k", -1.0, 1.0, 0.01, 0.333)
     assert len(axis.values) == 41
     assert (axis.values[0], axis.values[-1]) == (-1.0, 1.0)
@@ -157,11 +147,7 @@ def test_photographs_are_files_of_their_own_each_once(tmp_path):
     assert set(photographs) == {name for name in again.files if name.endswith(".webp")}
     assert (tmp_path / photographs[0]).read_bytes()[:4] == b"RIFF"
     assert b"data:image" not in (tmp_path / first.pack).read_bytes()
-
-
-def test_recording_again_gives_the_same_files(tmp_path):
-    made = [record(explore(Toy(), "height"), tmp_path / name) for name in "ab"]
-    assert made[0].files == made[1].files
+    assert record(explore(Toy(), "size"), tmp_path / "again").files == first.files
 
 
 def noise(rng: np.random.Generator, size: int) -> svg.Marks:
@@ -176,14 +162,6 @@ class Noisy(Toy):
     def figure(self, *, draft: bool = False) -> Picture:
         rng = np.random.default_rng(int(1000 * self.height) + 17)
         return Picture.whole(noise(rng, 20_000), 10, 10, "Noisy", f"height {self.height:g}")
-
-
-def test_positions_are_thinned_until_the_size_holds(tmp_path):
-    made = record(explore(Noisy(), "height"), tmp_path, budget=Budget(size=400_000))
-    assert made.size <= 400_000
-    assert 8 <= made.counts["height"] < 41
-    heights = [values["height"] for values, _ in states(made)]
-    assert (heights[0], heights[-1]) == (0, 1)
 
 
 @dataclass(frozen=True)
@@ -208,48 +186,34 @@ class Steep(Toy):
         return Picture.whole(noise(rng, 9_000), 10, 10, "Steep", f"height {self.height:g}")
 
 
+def test_positions_are_thinned_until_the_budget_holds(tmp_path):
+    """Of bytes or of positions; what all positions have in common takes none away, and the fewest are always made."""
+    made = record(explore(Noisy(), "height"), tmp_path, budget=Budget(size=400_000))
+    assert made.size <= 400_000
+    assert 8 <= made.counts["height"] < 41
+    heights = [values["height"] for values, _ in states(made)]
+    assert (heights[0], heights[-1]) == (0, 1)
+    heavy = record(explore(Heavy(), "height"), tmp_path)
+    made = record(explore(Heavy(), "height"), tmp_path, budget=Budget(size=int(1.6 * heavy.size)))
+    assert made.counts["height"] == heavy.counts["height"] == 41
+    whole = record(explore(Toy()), tmp_path)
+    made = record(explore(Toy()), tmp_path, budget=Budget(positions=whole.positions - 1))
+    assert 3 < made.counts["height"] < 41
+    fewest = record(explore(Toy()), tmp_path, budget=Budget(positions=1))
+    assert fewest.counts == {"size": 3, "height": 3, "colour": 3, "lit": 2}
+    words = r"^Toy: its fewest positions, \d+, do not fit into 0.03 MB: they take 0.1 MB.$"
+    with pytest.raises(BudgetError, match=words):
+        record(explore(Noisy(), "height"), tmp_path / "large", budget=Budget(size=30_000))
+    assert not [*(tmp_path / "large").glob("*.js")]
+    with pytest.raises(ValueError, match="together must name controls that are shown, size, got 'height'"):
+        explore(Toy(), "size", together=("size", "height"))
+
+
 def test_no_share_is_drawn_that_is_foretold_to_be_too_large(tmp_path):
     Steep.drawn.clear()
     made = record(explore(Steep(), "height"), tmp_path, budget=Budget(size=100_000))
     assert made.counts["height"] == 11
     assert len(set(Steep.drawn)) == 21  # 3 and 21, which were too large, and 11 of these; 15 would have been others
-
-
-def test_what_positions_have_in_common_takes_none_away(tmp_path):
-    whole = record(explore(Heavy(), "height"), tmp_path)
-    made = record(explore(Heavy(), "height"), tmp_path, budget=Budget(size=int(1.6 * whole.size)))
-    assert made.counts["height"] == whole.counts["height"] == 41
-
-
-def test_positions_are_thinned_to_their_number(tmp_path):
-    whole = record(explore(Toy()), tmp_path)
-    made = record(explore(Toy()), tmp_path, budget=Budget(positions=whole.positions - 1))
-    fewest = record(explore(Toy()), tmp_path, budget=Budget(positions=1))
-    assert whole.counts["height"] == 41
-    assert 3 < made.counts["height"] < 41
-    assert made.positions < whole.positions
-    assert fewest.counts == {"size": 3, "height": 3, "colour": 3, "lit": 2}
-
-
-def test_what_cannot_be_held_is_said_in_a_sentence(tmp_path):
-    with pytest.raises(
-        BudgetError, match=r"^Toy: its fewest positions, \d+, do not fit into 0.03 MB: they take 0.1 MB.$"
-    ):
-        record(explore(Noisy(), "height"), tmp_path / "large", budget=Budget(size=30_000))
-    assert not [*(tmp_path / "large").glob("*.js")]
-
-
-def test_together_names_controls_that_are_shown():
-    with pytest.raises(ValueError, match="together must name controls that are shown, size, got 'height'"):
-        explore(Toy(), "size", together=("size", "height"))
-
-
-def test_any_widget_is_recorded_by_what_its_kernel_answers(tmp_path):
-    made = record(Widget(Smallest(), (Axis.slider("x", 0.0, 100.0, 0.1, 0.0, most=5),), "A dot"), tmp_path)
-    drawings = [ElementTree.fromstring(frame["svg"]) for _, frame in states(made)]
-    assert [float(one.find(".//{*}circle").get("cx")) for one in drawings] == [0, 150, 300, 450, 600]
-    assert content(made)["traits"] == {}
-    assert (made.folder / made.files[1]).read_text().count("render") >= 1
 
 
 class Doubled(anywidget.AnyWidget):
@@ -267,6 +231,9 @@ class Doubled(anywidget.AnyWidget):
 def test_a_widget_that_is_moved_by_its_traits_is_recorded_too(tmp_path):
     made = record(Widget(Doubled(), (Axis.slider("x", 0, 4, 1, 1),), "Doubled"), tmp_path)
     assert [frame for _, frame in states(made)] == [{"x": x, "twice": 2 * x} for x in range(5)]
+    made = record(Widget(Smallest(), (Axis.slider("x", 0.0, 100.0, 0.1, 0.0, most=5),), "A dot"), tmp_path)
+    drawn = [one for _, frame in states(made) for one in ElementTree.fromstring(frame["svg"]).iter() if one.get("cx")]
+    assert [one.get("cx") for one in drawn] == ["0.0", "150.0", "300.0", "450.0", "600.0"]
 
 
 def test_a_pull_is_learnt_as_the_view_answers_it():
@@ -279,28 +246,8 @@ def test_a_pull_is_learnt_as_the_view_answers_it():
     assert [does["pulls"]["time"][0] for does in drawn.values()] == ["x"]
 
 
-def test_a_text_is_packed_without_loss():
-    pack, texts = Pack(), [f"<g>{'<line x=1/>' * 20}<text>{i}</text>plain {i}</g>" * 3 for i in range(3)]
-    packed = [pack.packed(one) for one in texts]
-    assert [unpacked(one, pack.pieces, 1.0) for one in packed] == texts
-    assert pack.pieces.count("<line x=1/>") == 1
-    assert len(Images().stored({"a": [1, "x"]})["a"]) == 2
-
-
-def test_the_still_is_a_file_beside_the_page_with_its_words(tmp_path):
-    made = record(explore(Toy(), "size"), tmp_path)
-    html = made.html("files/")
-    assert 'alt="Toy. size 1, height 0, red, True"' in html
-    assert 'loading="lazy" width="300" height="200"' in html
-    (still,) = tmp_path.glob("*.svg")
-    assert f'src="files/{still.name}"' in html
-    assert "data:image/webp;base64," in still.read_text()
-    assert f'data-recording="files/{made.pack}" data-positions="{made.positions}"' in html
-    assert len(html) < 1500
-
-
 @pytest.mark.parametrize("name", ["toy.mjs", "toy.html"])
-def test_a_pane_in_one_file_has_all_its_files_within(tmp_path, name):
+def test_a_recording_in_one_file_has_all_its_files_within(tmp_path, name):
     made = record(explore(Toy(), "size"), tmp_path / "recorded", budget=Budget(slider=5))
     text = write_one_file(made, tmp_path / name).read_text(encoding="utf-8")
     photographs = [one for one in made.files if one.endswith(".webp")]
@@ -309,6 +256,22 @@ def test_a_pane_in_one_file_has_all_its_files_within(tmp_path, name):
         data = b64encode((made.folder / one).read_bytes()).decode()
         assert f'camvizRecorded("{one}","data:image/webp;base64,{data}")' in text
     assert text.count("A still picture.") == 1
+    with pytest.raises(ValueError, match=r"the file must end in \.mjs \(a module\) or \.html \(a page\), got toy\.js"):
+        write_one_file(made, tmp_path / "toy.js")
+    html = made.html("files/")  # the still is outside the page, with its words and sizes
+    still = html.partition('src="files/')[2].partition('"')[0]
+    assert "data:image/webp;base64," in (made.folder / still).read_text()
+    assert 'alt="Toy. size 1, height 0, red, True"' in html
+    assert 'loading="lazy" width="300" height="200"' in html
+    assert f'data-recording="files/{made.pack}" data-positions="{made.positions}"' in html
+
+
+def test_a_text_is_packed_without_loss_and_kept_once():
+    pack, texts = Pack(), [f"<g>{'<line x=1/>' * 20}<text>{i}</text>plain {i}</g>" * 3 for i in range(3)]
+    packed = [pack.packed(one) for one in texts]
+    assert [unpacked(one, pack.pieces, 1.0) for one in packed] == texts
+    assert pack.pieces.count("<line x=1/>") == 1
+    assert len(Images().stored({"a": [1, "x"]})["a"]) == 2
 
 
 def test_no_text_of_a_widget_ends_the_script_of_a_page(tmp_path):
@@ -318,9 +281,3 @@ def test_no_text_of_a_widget_ends_the_script_of_a_page(tmp_path):
 
     made = record(Widget(Talker(), (), "Talker"), tmp_path)
     assert write_one_file(made, tmp_path / "page.html").read_text(encoding="utf-8").count("</script") == 1
-
-
-def test_a_file_of_another_ending_is_refused(tmp_path):
-    made = record(explore(Toy(), "size"), tmp_path, budget=Budget(slider=5))
-    with pytest.raises(ValueError, match=r"the file must end in \.mjs \(a module\) or \.html \(a page\), got toy\.js"):
-        write_one_file(made, tmp_path / "toy.js")

@@ -29,7 +29,7 @@ def test_a_state_of_every_view_is_among_them():
 @pytest.mark.sampled(20)
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize("name", STATES)
-def test_a_saved_view_holds_nothing_that_only_browsers_know(name, theme, tmp_path):
+def test_a_saved_view_has_nothing_that_only_browsers_know(name, theme, tmp_path):
     figure(name).save(tmp_path / "saved.svg", theme=theme)
     root = ElementTree.parse(tmp_path / "saved.svg").getroot()
     elements = list(root.iter())
@@ -42,13 +42,6 @@ def test_a_saved_view_holds_nothing_that_only_browsers_know(name, theme, tmp_pat
     assert [one.attrib for one in shapes if "fill" not in one.attrib and id(one) not in clips] == []  # these are black
 
 
-def test_light_and_dark_differ_in_their_colours_alone():
-    light, dark = (DistortionView(k1=-0.2).figure().portable(theme) for theme in ("light", "dark"))
-    assert "#1c2330" in light
-    assert "#1c2330" not in dark
-    assert re.sub(r"#[0-9a-f]{6}", "", light) == re.sub(r"#[0-9a-f]{6}", "", dark)
-
-
 def picture(body: Marks, **photographs: bytes) -> Picture:
     return Picture.whole(body, 40, 40, "Title", "What it shows", photographs)
 
@@ -57,7 +50,7 @@ def plain(body: Marks, **photographs: bytes) -> ElementTree.Element:
     return ElementTree.fromstring(picture(body, **photographs).portable())
 
 
-def test_the_stronger_rule_wins_and_an_elements_own_style_over_both():
+def test_the_stronger_rule_wins_and_an_own_style_over_both():
     drawn = svg.polygon([(0, 0), (9, 0), (9, 9)], "wash fill-blue")
     drawn += svg.line([(0, 0), (9, 9)], "blue thick") + svg.line([(0, 0), (9, 9)], "blue thick", stroke_width=7)
     drawn += svg.polygon([(0, 0), (9, 0), (9, 9)], "wash blue")
@@ -68,40 +61,32 @@ def test_the_stronger_rule_wins_and_an_elements_own_style_over_both():
     assert outlined.get("stroke") == "#0067a5"  # `path.blue` names more than `.wash`, which comes later
 
 
-def test_words_with_a_halo_stand_over_their_halo():
+def test_words_stand_over_their_halo_and_hints_are_left_out():
     halo, words = plain(svg.text((5, 5), "here", "label blue halo")).iter(f"{SVG}text")
     assert (halo.text, halo.get("stroke"), halo.get("fill")) == ("here", "#ffffff", "#ffffff")
     assert (words.text, words.get("stroke"), words.get("fill")) == ("here", None, "#0067a5")
-
-
-def test_hints_for_the_mouse_are_left_out():
     assert list(plain(svg.text((5, 5), "drag me", "note hint")).iter(f"{SVG}text")) == []
 
 
-def embedded(root: ElementTree.Element) -> np.ndarray:
-    (image,) = root.iter(f"{SVG}image")
-    data = re.fullmatch(r"data:image/png;base64,(.+)", image.get(LINK))[1]
+def embedded(drawn: Marks, **photographs: bytes) -> np.ndarray:
+    """The pixels of the one image of a saved picture."""
+    (image,) = plain(drawn, **photographs).iter(f"{SVG}image")
+    data = image.get(LINK).removeprefix("data:image/png;base64,")
     return cv2.imdecode(np.frombuffer(b64decode(data), np.uint8), cv2.IMREAD_UNCHANGED)
 
 
-def test_a_mask_becomes_transparency():
+def test_masks_and_hard_pixels_are_made_of_pixels():
+    """A mask becomes transparency; few pixels are given as many that a program's smoothing does not show."""
     grey, mask = np.full((4, 4), 90, np.uint8), np.diag([255] * 4).astype(np.uint8)
-    found = embedded(plain(svg.image("p", 0, 0, 4, 4, mask="m", mask_id="one"), p=jpeg(grey), m=png(mask)))
+    found = embedded(svg.image("p", 0, 0, 4, 4, mask="m", mask_id="one"), p=jpeg(grey), m=png(mask))
     np.testing.assert_array_equal(found[..., 3], mask)
     np.testing.assert_allclose(found[..., :3], 90, atol=2)
-
-
-def test_hard_pixels_are_given_as_many_that_smoothing_does_not_show():
     few = np.array([[0, 200], [50, 255]], np.uint8)
-    found = embedded(plain(svg.image("p", 0, 0, 40, 40, image_rendering="pixelated"), p=png(few)))
+    found = embedded(svg.image("p", 0, 0, 40, 40, image_rendering="pixelated"), p=png(few))
     assert found.shape == (160, 160)
     np.testing.assert_array_equal(found[::80, ::80], few)
-
-
-def test_a_colour_bar_one_pixel_wide_gets_pixels_enough_that_its_borders_do_not_fade():
-    ramp = np.linspace(0, 255, 64).astype(np.uint8)[:, None]
-    found = embedded(plain(svg.image("p", 0, 0, 14, 40), p=png(ramp)))
-    assert found.shape == (64, 14)
+    ramp = np.linspace(0, 255, 64).astype(np.uint8)[:, None]  # a colour bar one pixel wide
+    found = embedded(svg.image("p", 0, 0, 14, 40), p=png(ramp))
     np.testing.assert_array_equal(found, np.repeat(ramp, 14, axis=1))
 
 
@@ -131,7 +116,7 @@ def test_a_pdf_has_all_of_its_fonts_inside(tmp_path):
     assert b"DejaVuSans" in text
 
 
-def test_without_cairosvg_a_png_says_what_to_install_and_an_svg_is_saved(tmp_path, monkeypatch):
+def test_without_cairosvg_a_png_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "cairosvg", None)
     with pytest.raises(ModuleNotFoundError, match=r"pip install camviz\[figures\]") as refused:
         picture(svg.NOTHING).save(tmp_path / "p.png")
@@ -147,8 +132,5 @@ def test_without_cairosvg_a_png_says_what_to_install_and_an_svg_is_saved(tmp_pat
 def test_what_cannot_be_saved_is_refused_in_words(name, options, words, tmp_path):
     with pytest.raises(ValueError, match=words):
         picture(svg.NOTHING).save(tmp_path / name, **options)
-
-
-def test_for_a_browser_the_picture_keeps_its_style_sheet(tmp_path):
-    picture(svg.NOTHING).save(tmp_path / "p.svg", theme="browser")
+    picture(svg.NOTHING).save(tmp_path / "p.svg", theme="browser")  # keeps its style sheet
     assert "prefers-color-scheme: dark" in (tmp_path / "p.svg").read_text()
