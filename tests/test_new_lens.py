@@ -39,7 +39,7 @@ def test_it_obeys_the_laws_of_all_lenses(checkout):
     assert int(said.split(" passed")[0].split()[-1]) > 40
 
 
-def test_formats_write_it_under_the_names_of_its_rows_and_read_it_back(checkout):
+def test_formats_write_it_as_its_rows_say_and_read_it_back(checkout):
     code = """
 from pathlib import Path
 from camviz_clinic import load
