@@ -1,6 +1,7 @@
 """A copy of the repository to try things in: what is added there is seen by a camviz that runs there."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -20,6 +21,16 @@ COPIED = (
     "pyproject.toml",
     "conftest.py",
 )
+EXAMPLE = re.compile(r"^`(?P<path>[^`\n]+)`\n(?P<fence>`{3,})\w*\n(?P<text>.*?)^(?P=fence)$", re.MULTILINE | re.DOTALL)
+RECIPES = (ROOT / "docs/recipes.md").read_text(encoding="utf-8")
+
+
+def examples(heading: str, page: str = RECIPES) -> dict[str, str]:
+    """The files of a section of docs/recipes.md, and the rows of those that are there already, by their paths."""
+    section = re.split(r"^## ", page.partition(f"\n## {heading}\n")[2], maxsplit=1, flags=re.MULTILINE)[0]
+    found = {each["path"]: each["text"] for each in EXAMPLE.finditer(section)}
+    assert found, f"docs/recipes.md has no example of {heading}"
+    return found
 
 
 @dataclass(frozen=True)
@@ -30,17 +41,23 @@ class House:
     before: dict[str, bytes]
 
     def add(self, files: dict[str, str]) -> None:
-        """Writes files that are not there yet, by their paths from the top of the repository."""
+        """Writes new files, and rows into files that are there, by their paths from the top of the repository."""
         for path, text in files.items():
-            assert path not in self.before, f"{path} is there already"
+            if path in self.before:
+                text = _with_rows(self.text(path), text)
             (self.root / path).parent.mkdir(parents=True, exist_ok=True)
             (self.root / path).write_text(text, encoding="utf-8")
 
     def run(self, *arguments: str, status: int = 0) -> str:
         """What `python ARGUMENTS` prints there."""
-        environment = {**os.environ, "PYTHONPATH": str(self.root)}
+        environment = {**os.environ, "PYTHONPATH": str(self.root), "PYTHONUTF8": "1"}
         done = subprocess.run(
-            [sys.executable, *arguments], cwd=self.root, env=environment, capture_output=True, text=True, check=False
+            [sys.executable, *arguments],
+            cwd=self.root,
+            env=environment,
+            capture_output=True,
+            encoding="utf-8",
+            check=False,
         )
         assert done.returncode == status, done.stdout + done.stderr
         return done.stdout
@@ -62,6 +79,17 @@ def house(folder: Path) -> House:
         else:
             shutil.copyfile(ROOT / name, folder / name)
     return House(folder, _files(folder))
+
+
+def _with_rows(text: str, rows: str) -> str:
+    """A file's text with the rows that have a + in front, each beneath the one above it, which the file has once."""
+    above = ""
+    for mark, row in re.findall(r"^([ +])(.*\n)", rows, re.MULTILINE):
+        if mark == "+":
+            text = text.replace(above, above + row)
+        above = row
+        assert text.count(above) == 1, above
+    return text
 
 
 def _files(folder: Path) -> dict[str, bytes]:

@@ -10,6 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 
 import camviz_clinic
 from camviz.colour.picture_files import PictureError, allowing, picture_size, read_gray, read_picture
@@ -61,7 +62,9 @@ def complaint(path: Path) -> str:
 def test_a_bomb_is_refused_by_its_header_before_anything_is_decoded(tmp_path, monkeypatch):
     (tmp_path / "bomb.png").write_bytes(png(30_000, 30_000))
     monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("it was decoded"))
+    bound = Image.MAX_IMAGE_PIXELS
     assert "it has 30000 × 30000 pixels, 900 megapixels, expected at most 64" in complaint(tmp_path / "bomb.png")
+    assert bound == Image.MAX_IMAGE_PIXELS  # what others open with Pillow stays guarded
 
 
 def test_a_limit_can_be_raised_and_lowered(tmp_path, monkeypatch, capsys):

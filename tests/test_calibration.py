@@ -27,9 +27,9 @@ from camviz_clinic.calibration import (
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.chessboards import at_saddles, crossed
 from camviz_clinic.calibration.detection import detect_pair
-from camviz_clinic.calibration.models import pose_from_rays
 from camviz_clinic.calibration.pairing import paired
 from camviz_clinic.calibration.paper import black_parts
+from camviz_clinic.calibration.solvers import pose_from_rays
 from camviz_clinic.files import Board
 from camviz_school.samples import SampleUnavailable, sample
 

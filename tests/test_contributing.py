@@ -5,15 +5,12 @@ import re
 
 import nbformat
 import pytest
-from house import ROOT, house
+from house import RECIPES, ROOT, examples, house
 
 NUMBER = f"{1 + max(int(path.name[:2]) for path in (ROOT / 'lessons').glob('[0-9][0-9]_*.ipynb'))}"
 """The next free one: the page may name one that has been taken since."""
-WRITTEN = (ROOT / "docs/recipes.md").read_text(encoding="utf-8")
-(NAMED,) = re.findall(r"^`lessons/material/(\d\d)/lesson.toml`$", WRITTEN, re.MULTILINE)
-PAGE = re.sub(rf"(?<!\d){NAMED}(?!\d)", NUMBER, WRITTEN)
-EXAMPLE = re.compile(r"^`(?P<path>[^`\n]+)`\n(?P<fence>`{3,})\w*\n(?P<text>.*?)^(?P=fence)$", re.MULTILINE | re.DOTALL)
-EXAMPLES = {found["path"]: found["text"] for found in EXAMPLE.finditer(PAGE)}
+(NAMED,) = re.findall(r"^`lessons/material/(\d\d)/lesson.toml`$", RECIPES, re.MULTILINE)
+PAGE = re.sub(rf"(?<!\d){NAMED}(?!\d)", NUMBER, RECIPES)
 CELL = re.compile(r"^# %%(?P<words>.*)$", re.MULTILINE)
 
 
@@ -33,10 +30,9 @@ def cell(words, source):
     return nbformat.v4.new_code_cell(source, metadata=metadata)
 
 
-def example(where):
-    """The files of one example, as they are written: a notebook from its cells."""
-    found = {path: text for path, text in EXAMPLES.items() if path.startswith(where)}
-    assert found, f"docs/recipes.md has no example of {where}"
+def lesson_files():
+    """The files of the lesson, the notebook from its cells."""
+    found = examples("A lesson", PAGE)
     return {path: notebook(text) if path.endswith(".ipynb") else text for path, text in found.items()}
 
 
@@ -44,13 +40,13 @@ def example(where):
 def lesson(tmp_path_factory):
     """The lesson of the page, written, and the pages made anew."""
     made = house(tmp_path_factory.mktemp("house") / "camviz")
-    made.add(example("lessons/"))
+    made.add(lesson_files())
     made.run("-m", "camviz_school.commands.lessons", "pages")
     return made
 
 
 def test_a_lesson_is_a_notebook_and_its_folder():
-    written = example("lessons/")
+    written = lesson_files()
     assert {re.match(r"lessons/(material/\d+|.*)", path)[1] for path in written} == {
         f"{NUMBER}_shadows.ipynb",
         f"material/{NUMBER}",
@@ -60,7 +56,7 @@ def test_a_lesson_is_a_notebook_and_its_folder():
 @pytest.mark.thorough
 def test_the_pages_list_the_lesson_in_its_place_and_nothing_else_is_written(lesson):
     made = {"README.md", "docs/glossary.md", "lessons/00_start_here.ipynb"}
-    assert lesson.touched() == {*made, *example("lessons/")}
+    assert lesson.touched() == {*made, *lesson_files()}
     readme = lesson.text("README.md")
     assert f"| **[{NUMBER} Shadows](lessons/{NUMBER}_shadows.ipynb)** |" in readme
     row = "How tall is a tree that you cannot climb? | the sun measures every tree at once | a tree of your own | 10 |"
@@ -131,12 +127,12 @@ def test_a_teacher_gets_the_lesson_with_its_key_its_solution_and_its_sheets(less
     assert all("Shadows" in page for page in pages.values())
 
 
-# The other three ------------------------------------------------------------------------------------------------------
+# A format and a finding -----------------------------------------------------------------------------------------------
 
 
-def added(tmp_path, where):
-    """A copy of the repository with the one file of an example in a folder."""
-    files = example(where)
+def added(tmp_path, heading):
+    """A copy of the repository with the one file of an example."""
+    files = examples(heading)
     assert len(files) == 1
     made = house(tmp_path / "camviz")
     made.add(files)
@@ -150,26 +146,8 @@ def held(made, tests, words):
 
 
 @pytest.mark.thorough
-def test_a_lens_is_one_file(tmp_path):
-    """In a copy of the whole repository; test_new_lens.py holds the same example to the same laws in one of camviz."""
-    made = added(tmp_path, "camviz/lenses/")
-    code = """
-from math import pi, sin
-
-from camviz.lenses import LENSES, SineFisheye, calibration_models
-
-x, y = SineFisheye(0.7).project([1, 0, 0])
-print(LENSES["sine_fisheye"] is SineFisheye, "sine" in calibration_models())
-print(abs(x - sin(0.35 * pi) / 0.7) < 1e-15)
-"""
-    assert made.run("-c", code).split() == ["True"] * 3
-    assert "sine " in made.run("-m", "camviz", "calibrate", "--help")
-    assert held(made, "tests/test_lenses.py", "sine_fisheye or SineFisheye") > 20
-
-
-@pytest.mark.thorough
 def test_a_calibration_format_is_one_file(tmp_path):
-    made = added(tmp_path, "camviz_clinic/files/")
+    made = added(tmp_path, "A calibration format")
     (made.root / "a.toy").write_text("toy 640 480 500 321.25 239.5\n")
     made.run("-m", "camviz", "convert", "a.toy", "b.yml", "--to", "opencv")
     made.run("-m", "camviz", "convert", "b.yml", "c.toy", "--to", "toy")
@@ -183,7 +161,7 @@ def test_a_calibration_format_is_one_file(tmp_path):
 
 @pytest.mark.thorough
 def test_a_finding_is_one_file(tmp_path, thorough):
-    made = added(tmp_path, "camviz_clinic/checks/findings/")
+    made = added(tmp_path, "A finding")
     code = """
 import json
 import numpy as np

@@ -7,6 +7,7 @@ from runpy import run_path
 
 import numpy as np
 import pytest
+from house import examples
 from scipy.spatial.transform import RigidTransform, Rotation
 
 import camviz_clinic.files
@@ -15,6 +16,7 @@ from camviz.lenses import Perspective
 from camviz_clinic.commands import command
 from camviz_clinic.files import Calibration, CalibrationError, File, Format, format_of, formats, write
 from camviz_clinic.files.models import same_camera
+from camviz_clinic.files.parameter_layouts import LAYOUTS
 from camviz_clinic.files.registry import written
 
 PAGE = Path(__file__).parents[1] / "docs" / "formats.md"
@@ -30,8 +32,7 @@ def toy(tmp_path, monkeypatch):
     """The format of docs/recipes.md as the one file of a folder in which formats are looked for."""
     folder = tmp_path / "more"
     folder.mkdir()
-    page = PAGE.with_name("recipes.md").read_text(encoding="utf-8")
-    code = page.split("## A calibration format")[1].split("```python\n")[1].split("```")[0]
+    (code,) = examples("A calibration format").values()
     (folder / "toy.py").write_text(code, encoding="utf-8")
     monkeypatch.setattr(camviz_clinic.files, "__path__", [*camviz_clinic.files.__path__, str(folder)])
     yield folder
@@ -185,3 +186,12 @@ def test_two_formats_of_one_name_are_refused(toy):
     path.write_text(path.read_text().replace('name="toy"', 'name="ros"'))
     with pytest.raises(ValueError, match="two formats are named ros"):
         formats()
+
+
+@pytest.mark.parametrize("program", LAYOUTS)
+def test_layouts_name_parameters_that_their_lenses_have(program):
+    """A program's list and what it fixes are of the lens's parameters and a camera's, none of them twice."""
+    for model in LAYOUTS[program]:
+        names = [*model.names, *model.fixed]
+        assert len(names) == len(set(names)), model
+        assert {"cx", "cy"} <= set(names) <= {"f", "fx", "fy", "cx", "cy", "skew", *model.lens.parameters()}, model

@@ -4,6 +4,7 @@ from dataclasses import FrozenInstanceError
 from math import atan, inf, pi, sqrt
 
 import cv2
+import lens_examples
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -34,12 +35,9 @@ from camviz.lenses.base import Lens, on_plane, unit
 FOCAL_PX = 500
 TOLERANCE = 1e-9 / FOCAL_PX  # 1e-9 px
 
-# Every lens by the examples that it declares: (lens, the largest angle in degrees from its axis that it sees in every
-# direction, or nearly).
 EXAMPLES = {
-    "_".join(filter(None, (name, example.label))): (lens(*example.parameters), example.widest_deg)
-    for name, lens in LENSES.items()
-    for example in lens.examples
+    "_".join(filter(None, (name, label))): (LENSES[name](*parameters), widest_deg)
+    for name, label, parameters, widest_deg in lens_examples.EXAMPLES
 }
 
 every_lens = pytest.mark.parametrize(("lens", "widest_deg"), EXAMPLES.values(), ids=EXAMPLES)
@@ -242,7 +240,7 @@ def test_a_lens_is_a_value(lens, widest_deg):
 
 def test_every_lens_has_a_name_and_examples_with_labels_of_their_own():
     assert set(LENSES.values()) == {type(lens) for lens, _ in EXAMPLES.values()}
-    assert len(EXAMPLES) == sum(len(lens.examples) for lens in LENSES.values())
+    assert len(EXAMPLES) == len(lens_examples.EXAMPLES)
 
 
 def test_the_lenses_that_camviz_has_always_had_are_found():
@@ -263,12 +261,10 @@ def test_parameters_must_be_finite(cls, bad):
             cls(**{**dict.fromkeys(names, 0.5), name: bad})
 
 
-@pytest.mark.parametrize(
-    ("lens", "parameters", "message"), [(lens, *each) for lens in LENSES.values() for each in lens.invalid]
-)
+@pytest.mark.parametrize(("lens", "parameters", "message"), lens_examples.INVALID)
 def test_parameters_outside_their_published_range_are_refused(lens, parameters, message):
     with pytest.raises(ValueError, match=message):
-        lens(*parameters)
+        LENSES[lens](*parameters)
 
 
 @pytest.mark.parametrize(
@@ -369,17 +365,6 @@ def test_the_jacobian_foretells_how_far_an_image_moves(lens, widest_deg):
     ahead, behind = (lens.project(on_plane(xy[:, None] + way * step)) for way in (1, -1))
     numeric = np.swapaxes((ahead - behind) / 2e-5, -1, -2)
     np.testing.assert_allclose(lens.jacobian(xy), numeric, rtol=1e-5, atol=1e-7)
-
-
-@every_lens
-def test_the_spellings_of_a_lens_name_parameters_that_it_has(lens, widest_deg):
-    """A program's list and what it fixes are of the lens's parameters and a camera's, none of them twice."""
-    known = {"f", "fx", "fy", "cx", "cy", "skew", *lens.parameters()}
-    for spelling in lens.spellings:
-        names = [*spelling.parameters.split(), *spelling.fixed]
-        assert len(names) == len(set(names)), spelling
-        assert set(names) <= known, spelling
-        assert {"cx", "cy"} <= set(names), spelling
 
 
 def test_a_point_behind_a_pinhole_has_no_image():

@@ -13,9 +13,10 @@ import struct
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from importlib import import_module
+from io import BytesIO
 from os import PathLike
 from pathlib import Path
+from threading import Lock
 from typing import Any, BinaryIO
 
 import cv2
@@ -29,38 +30,14 @@ BYTES_A_PIXEL = 16  # four channels of 32 bits, uncompressed
 BESIDE = 64 * 2**20  # bytes for what cameras put beside the pixels: thumbnails, profiles, maker's notes
 HEAD = 2**16
 
-_KINDS = {
-    "PNG": rb"\x89PNG",
-    "JPEG": rb"\xff\xd8\xff",
-    "TIFF": rb"II[*+]\0|MM\0[*+]",
-    "WebP": rb"RIFF....WEBP",
-    "BMP": rb"BM",
-    "GIF": rb"GIF8",
-    "JPEG 2000": rb"\0\0\0\x0cjP  |\xff\x4f\xff\x51",
-    "PNM": rb"P[1-6f][ \t\r\n#]",
-    "AVIF": rb"....ftypavi[fs]",
-    "Sun raster": rb"\x59\xa6\x6a\x95",
-    "HDR": rb"#\?R(?:ADIANCE|GBE)",
-    "EXR": rb"v/1\x01",
-}
-_PLUGINS = {  # Pillow's, where they are not named as the kind
-    "JPEG": ("JpegImagePlugin", "JPEG"),
-    "WebP": ("WebPImagePlugin", "WEBP"),
-    "JPEG 2000": ("Jpeg2KImagePlugin", "JPEG2000"),
-    "PNM": ("PpmImagePlugin", "PPM"),
-    "Sun raster": ("SunImagePlugin", "SUN"),
-    "BMP": ("BmpImagePlugin", "BMP"),
-    "PNG": ("PngImagePlugin", "PNG"),
-    "GIF": ("GifImagePlugin", "GIF"),
-    "AVIF": ("AvifImagePlugin", "AVIF"),
-}
-_WITH_EXIF = {"TIFF": ("TiffImagePlugin", "TIFF")} | {kind: _PLUGINS[kind] for kind in ("JPEG", "PNG", "WebP")}
+_FORMATS = ("JPEG", "PNG", "BMP", "GIF", "PPM", "WEBP", "JPEG2000", "SUN", "AVIF", "TIFF")  # that OpenCV reads, too
+_NAMES = {"MPO": "JPEG", "PPM": "PNM", "WEBP": "WebP", "JPEG2000": "JPEG 2000", "SUN": "Sun raster"}
 _EXIF = 0x8769  # the tag of EXIF's own directory
+_WIDTH, _HEIGHT = 256, 257  # TIFF's tags
 _HDR_SIZE = re.compile(rb"\n\n[-+]Y (\d{1,9}) [-+]X (\d{1,9})\n")
 _EXR_WINDOW = re.compile(rb"dataWindow\0box2i\0\x10\0\0\0(.{16})", re.DOTALL)
-_WIDTH, _HEIGHT = 256, 257  # TIFF's tags
-_MARKER = re.compile(rb"\xff[^\x00\xff\xd0-\xd8]")  # in a JPEG's scan: neither a stuffed byte nor a restart
-_END_OF_IMAGE, _TEMPORARY = 0xD9, 0x01
+_END_OF_JPEG = b"\xff\xd9"
+_PILLOW = Lock()  # held while its bound is lifted
 
 
 class PictureError(ValueError):
@@ -125,14 +102,11 @@ def picture_exif(path: str | PathLike[str]) -> Mapping[int, Any]:
     Raises PictureError as `picture_size`.
     """
     with _opened(path) as file:
-        kind, _ = _header(path, file)
-        if kind not in _WITH_EXIF:
-            return {}
-        file.seek(0)
+        _header(path, file)
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                exif = _plugin(*_WITH_EXIF[kind], file).getexif()
+                exif = _lazily_opened(file).getexif()
                 return {**exif, **exif.get_ifd(_EXIF)}
         except Exception:  # of many kinds, from SyntaxError to struct.error
             return {}
@@ -188,55 +162,53 @@ def _opened(path: str | PathLike[str]) -> Iterator[BinaryIO]:
 
 
 def _header(path: str | PathLike[str], file: BinaryIO) -> tuple[str, tuple[int, int]]:
-    """What kind of picture a file is, and its width and height."""
+    """What kind of picture a file is, and its width and height: as Pillow says where it knows the kind."""
     head = file.read(HEAD)
-    kind = next((kind for kind, signature in _KINDS.items() if re.match(signature, head, re.DOTALL)), None)
-    if kind is None:
-        raise PictureError(path, f"it is not a picture that can be read, it begins with {_shown(head)}")
-    size = _of_hdr(head) if kind == "HDR" else _of_exr(head) if kind == "EXR" else _by_pillow(kind, file)
-    if size is None or min(size) < 1:
-        raise PictureError(path, f"the header of the {kind} picture is cut off or damaged: it tells no size")
+    try:
+        if head.startswith((b"#?RADIANCE", b"#?RGBE")):
+            kind, size = "HDR", _of_hdr(head)
+        elif head.startswith(b"v/1\x01"):
+            kind, size = "EXR", _of_exr(head)
+        elif head.startswith((b"II*\0", b"II+\0", b"MM\0*", b"MM\0+")):
+            kind, size = "TIFF", _of_tiff(file)
+        else:
+            picture = _lazily_opened(file)
+            kind, size = _NAMES.get(picture.format, picture.format), picture.size
+    except Exception as error:  # of many kinds, from SyntaxError to struct.error
+        raise PictureError(path, f"it is not a picture that can be read, it begins with {_shown(head)}") from error
+    if min(size) < 1:
+        raise PictureError(path, f"the header of the {kind} picture is damaged: it says {size[0]} × {size[1]} pixels")
     return kind, size
 
 
 def _shown(head: bytes) -> str:
-    """How a file begins: as words where it is text, else as hexadecimal bytes."""
-    return repr(head[:12].decode()) if head[:12].isascii() and head[:12].decode().isprintable() else head[:8].hex(" ")
+    """How a file begins: as words where it is text, else as hexadecimal bytes, which may be those of a picture."""
+    words = head[:12].decode("ascii", "replace")
+    return repr(words) if words.isascii() and words.isprintable() else f"{head[:8].hex(' ')} and may be cut off"
 
 
-def _by_pillow(kind: str, file: BinaryIO) -> tuple[int, int] | None:
-    """The size in a header, None for one that breaks off or makes no sense.
+def _lazily_opened(file: BinaryIO) -> Any:
+    """Pillow's picture of a file, of which nothing is decoded. Raises an exception of many kinds where it has none.
 
-    Image.open is not asked: it refuses what it takes for too many pixels without saying how many there are.
+    Its bound on pixels is lifted for that moment: it would refuse a large picture and not say how large it is.
     """
-    file.seek(0)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # damaged EXIF and the like
-            return _of_tiff(file) if kind == "TIFF" else _of_plugin(*_PLUGINS[kind], file)
-    except Exception:  # of many kinds, from SyntaxError to struct.error
-        return None
-
-
-def _of_plugin(module: str, name: str, file: BinaryIO) -> tuple[int, int]:
-    width, height = _plugin(module, name, file).size
-    return width, height
-
-
-def _plugin(module: str, name: str, file: BinaryIO) -> Any:
-    """Pillow's picture of a file, of which nothing is decoded."""
     from PIL import Image
 
-    import_module(f"PIL.{module}")
-    opener, _ = Image.OPEN[name]
-    return opener(file, "")
+    with _PILLOW, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # damaged EXIF and the like
+        bound, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
+        try:
+            return Image.open(file, formats=_FORMATS)
+        finally:
+            Image.MAX_IMAGE_PIXELS = bound
 
 
 def _of_tiff(file: BinaryIO) -> tuple[int, int]:
     """From the first directory: Pillow refuses pixels of 64 bits and others that OpenCV reads."""
     from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
-    big = file.read(4)[2:] in (b"+\0", b"\0+")
+    file.seek(0)
+    big = b"+" in file.read(4)
     file.seek(0)
     directory = ImageFileDirectory_v2(file.read(16 if big else 8))
     file.seek(directory.next)
@@ -244,16 +216,13 @@ def _of_tiff(file: BinaryIO) -> tuple[int, int]:
     return int(directory[_WIDTH]), int(directory[_HEIGHT])
 
 
-def _of_hdr(head: bytes) -> tuple[int, int] | None:
-    found = _HDR_SIZE.search(head)
-    return (int(found[2]), int(found[1])) if found else None
+def _of_hdr(head: bytes) -> tuple[int, int]:
+    height, width = map(int, _HDR_SIZE.findall(head)[0])
+    return width, height
 
 
-def _of_exr(head: bytes) -> tuple[int, int] | None:
-    found = _EXR_WINDOW.search(head)
-    if not found:
-        return None
-    left, top, right, bottom = struct.unpack("<4i", found[1])
+def _of_exr(head: bytes) -> tuple[int, int]:
+    left, top, right, bottom = struct.unpack("<4i", _EXR_WINDOW.findall(head)[0])
     return right - left + 1, bottom - top + 1
 
 
@@ -276,19 +245,16 @@ def _cut_off(kind: str, content: bytes) -> bool:
     """Whether a picture surely ends before its end: older versions of OpenCV fill it up with grey."""
     if kind == "PNG":
         return b"IEND" not in content[-BESIDE:]
-    return kind == "JPEG" and not _reaches_end(content)
+    return kind == "JPEG" and content.find(_END_OF_JPEG, _first_scan(content)) < 0
 
 
-def _reaches_end(jpeg: bytes) -> bool:
-    """Whether the end marker comes after the segments and scans; the one of a thumbnail inside a segment is not it."""
-    at = 2
-    while found := _MARKER.search(jpeg, at):
-        marker, at = jpeg[found.start() + 1], found.end()
-        if marker == _END_OF_IMAGE:
-            return True
-        if marker != _TEMPORARY:
-            at += int.from_bytes(jpeg[at : at + 2], "big")
-    return False
+def _first_scan(jpeg: bytes) -> int:
+    """Where the pixels begin, behind the segments, one of which may hold a thumbnail with an end of its own."""
+    from PIL.JpegImagePlugin import JpegImageFile
+
+    file = BytesIO(jpeg)
+    JpegImageFile(file)
+    return file.tell()
 
 
 def _decoded(content: bytes, flags: int) -> NDArray[Any] | None:

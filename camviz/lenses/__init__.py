@@ -14,13 +14,13 @@ from camviz.lenses.panoramas import Cylindrical, Equirectangular  # noqa: F401
 from camviz.lenses.perspective import Perspective  # noqa: F401
 
 if TYPE_CHECKING:  # the catalogue finds these without a line; type checkers do not
-    from camviz.lenses.catalogue import LENSES, calibration_models, same_lenses, spelled  # noqa: F401
+    from camviz.lenses.catalogue import LENSES, same_lenses  # noqa: F401
     from camviz.lenses.kannala_brandt import KannalaBrandt  # noqa: F401
     from camviz.lenses.modified_brown_conrady import ModifiedBrownConrady  # noqa: F401
     from camviz.lenses.spheres import DoubleSphere, ExtendedUnified, UnifiedSphere  # noqa: F401
     from camviz.lenses.thin_prism_fisheye import ThinPrismFisheye  # noqa: F401
 
-_OF_ALL = ("LENSES", "calibration_models", "same_lenses", "spelled")
+_OF_ALL = ("LENSES", "same_lenses")
 
 
 def __getattr__(name: str) -> Any:

@@ -1,14 +1,14 @@
 """What every lens is: a map between directions in front of the camera and points on its image, at focal length 1.
 
-A lens is one file in this folder: a frozen dataclass under `Lens` that has `image` and `ray`, and declares in its class
-body what the rest of camviz has to know of it. `camviz.lenses` finds the file; nothing else names it.
+A lens is one file in this folder: a frozen dataclass under `Lens` that has `image` and `ray`. It knows optics only;
+how programs write it stands with their formats. `camviz.lenses` finds the file.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from math import isfinite
 from typing import Any, ClassVar
 
@@ -31,11 +31,20 @@ from camviz.lenses.arrays import (  # noqa: F401
     on_plane,
     unit,
 )
-from camviz.lenses.declarations import CalibrationModel, Example, Fold, Spelling
 
 ROUNDING = 1e-12  # how far beyond the rim of its image a point may lie and still be a rounded point of the rim
 STEP = np.finfo(float).eps ** (1 / 3)  # where a central difference is exact to STEP², about 4e-11
 NO_DENOMINATOR = Polynomial([1.0])
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Where a lens's radial equation turns back: rays farther out would share their images with rays before it."""
+
+    radius: float  # in the variable of the equation: r on the plane z = 1, or the angle θ
+    angle: float  # in radians between the axis and the ray there; infinity where no ray gets there
+    image: float  # in focal lengths from the principal point
+    unit: str = "focal lengths"  # of the radius
 
 
 class Lens(ABC):
@@ -56,10 +65,6 @@ class Lens(ABC):
     array([1., 0., 0.])
     """
 
-    spellings: ClassVar[tuple[Spelling, ...]] = ()
-    calibrations: ClassVar[tuple[CalibrationModel, ...]] = ()
-    examples: ClassVar[tuple[Example, ...]] = ()
-    invalid: ClassVar[tuple[tuple[tuple[float, ...], str], ...]] = ()  # parameters, and the error's message
     plain: ClassVar[type[Lens] | None] = None  # the lens without parameters that it is where all of its own are 0
     goes_round: ClassVar[bool] = False  # true of a panorama, which sees straight behind itself
     denominator_terms: ClassVar[tuple[str, ...]] = ()  # the parameters a, b … of its `denominator` 1 + a s + b s² + …

@@ -11,15 +11,10 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from camviz.lenses.arrays import Coordinates, ImagePoints, ImagePointsLike, Jacobians, Mask, Radii, RadiiLike
-from camviz.lenses.base import Array, as_points, blockwise, check_parameters, check_range
-from camviz.lenses.declarations import CalibrationModel, Example, Fold, Spelling
+from camviz.lenses.base import Array, Fold, as_points, blockwise, check_parameters, check_range
 from camviz.lenses.folding import FoldingLens, first_positive_root, polynomial_roots
 from camviz.lenses.perspective import Perspective
 
-GRID = "fx fy cx cy"
-RADTAN = "k1 k2 p1 p2"
-RATIONAL = f"{RADTAN} k3 k4 k5 k6"
-PRISM = f"{RATIONAL} s1 s2 s3 s4"
 MAX_CANCELLED_GAP = 0.01  # of r² at a pole: a root of the numerator as near as this almost cancels the pole
 
 
@@ -67,73 +62,6 @@ class BrownConrady(FoldingLens):
     tau_x: float = 0.0
     tau_y: float = 0.0
 
-    spellings = (
-        Spelling("basalt", "pinhole-radtan8", f"{GRID} {RATIONAL}"),
-        Spelling("camodocal", "PINHOLE", f"{GRID} {RADTAN}"),
-        Spelling("camodocal", "PINHOLE_FULL", f"{GRID} {RATIONAL}"),
-        Spelling("colmap", "SIMPLE_RADIAL", "f cx cy k1", number=2),
-        Spelling("colmap", "RADIAL", "f cx cy k1 k2", number=3),
-        Spelling("colmap", "OPENCV", f"{GRID} {RADTAN}", number=4),
-        Spelling("colmap", "FULL_OPENCV", f"{GRID} {RATIONAL}", number=6),
-        Spelling("euroc", "radial-tangential", f"{GRID} {RADTAN}"),
-        Spelling("kalibr", "pinhole radtan", f"{GRID} {RADTAN}"),
-        Spelling("kitti-raw", "K and D", f"{GRID} {RADTAN} k3"),
-        Spelling("matlab", "cameraParameters", f"{GRID} skew {RADTAN} k3"),
-        Spelling("metashape", "frame", f"{GRID} skew {RADTAN} k3"),
-        Spelling("mrcal", "LENSMODEL_OPENCV4", f"{GRID} {RADTAN}"),
-        Spelling("mrcal", "LENSMODEL_OPENCV5", f"{GRID} {RADTAN} k3"),
-        Spelling("mrcal", "LENSMODEL_OPENCV8", f"{GRID} {RATIONAL}"),
-        Spelling("mrcal", "LENSMODEL_OPENCV12", f"{GRID} {PRISM}"),
-        Spelling("nerfstudio", "OPENCV", f"{GRID} {RADTAN} k3"),
-        Spelling("opencv", "distortion_coefficients", f"{GRID} {RADTAN} k3"),
-        Spelling("opencv", "distortion_coefficients", f"{GRID} {RATIONAL}"),
-        Spelling("opencv", "distortion_coefficients", f"{GRID} {PRISM}"),
-        Spelling("opencv", "distortion_coefficients", f"{GRID} {PRISM} tau_x tau_y"),
-        Spelling("orbslam", "PinHole", f"{GRID} {RADTAN} k3"),
-        Spelling("okvis", "radialtangential", f"{GRID} {RADTAN}"),
-        Spelling("okvis", "radialtangential8", f"{GRID} {RATIONAL}"),
-        Spelling("opensfm", "perspective", "f cx cy k1 k2"),
-        Spelling("opensfm", "brown", f"{GRID} k1 k2 p1 p2 k3"),
-        Spelling("ros", "plumb_bob", f"{GRID} {RADTAN} k3"),
-        Spelling("ros", "rational_polynomial", f"{GRID} {RATIONAL}"),
-        Spelling("stella", "perspective", f"{GRID} {RADTAN} k3"),
-        Spelling("svo", "pinhole radial-tangential", f"{GRID} {RADTAN}"),
-    )
-    calibrations = (
-        CalibrationModel(
-            "standard", "Brown-Conrady", f"{RADTAN} k3", "k1 k2 p1 p2 k3: most cameras", "calibrateCamera"
-        ),
-        CalibrationModel(
-            "rational",
-            "Brown-Conrady, rational",
-            RATIONAL,
-            "and k4 k5 k6, kept from poles by a prior: wide angles, with many views up to the image's corners",
-            "calibrateCamera",
-            "CALIB_RATIONAL_MODEL",
-            regularised=True,
-        ),
-        CalibrationModel(
-            "thin-prism",
-            "Brown-Conrady with thin prisms",
-            f"{RADTAN} k3 s1 s2 s3 s4",
-            "and s1 s2 s3 s4 beside the standard ones: tilted or decentred lenses",
-            "calibrateCamera",
-            "CALIB_THIN_PRISM_MODEL",
-        ),
-    )
-    examples = (
-        Example("none", (), 88),
-        Example("barrel", (-0.3,), 46),
-        Example("5", (-0.28, 0.07, 1e-3, -5e-4, 0.01), 60),
-        Example("8", (0.5, 0.1, 1e-3, -5e-4, 0.01, 0.6, 0.2, 0.02), 60),
-        Example("12", (-0.2, 0.1, 1e-3, -2e-3, 0.01, 0.1, 0, 0, 1e-2, -2e-3, -4e-3, 3e-3), 45),
-        Example("14", (-0.2, 0.1, 1e-3, -2e-3, 0, 0, 0, 0, 1e-2, -2e-3, -4e-3, 3e-3, 0.1, -0.07), 45),
-        Example("only_tangential", (0, 0, 0.1, -0.05), 40),
-        Example("folding_early", (0.296, -1.035, 0.01, -0.02), 32),
-        Example("before_a_pole", (0.1, 0, 0, 0, 0, -0.8), 45),
-        Example("strong", (30, -2, 0, 0, -400), 10),
-    )
-    invalid = (((0,) * 12 + (1.6,), "tau_x must be an angle between -π/2 and π/2 radians, got 1.6"),)
     plain = Perspective
     denominator_terms = ("k4", "k5", "k6")
     may_mirror = True

@@ -1,4 +1,4 @@
-"""Every lens there is, by name: which programs know it, how they write it, and under what other names it goes.
+"""Every lens there is, by name, and under what other names it goes.
 
 Every module of this folder is looked through for lenses, so that a new one is a new file and no line elsewhere. Its
 name in `LENSES` is the class's, in small letters.
@@ -11,7 +11,6 @@ from inspect import isabstract
 from pkgutil import iter_modules
 
 from camviz.lenses.base import Lens
-from camviz.lenses.declarations import CalibrationModel, Spelling
 from camviz.lenses.perspective import Perspective
 
 
@@ -35,32 +34,6 @@ LENSES: dict[str, type[Lens]] = {  # the pinhole first, the others by their file
 >>> LENSES["double_sphere"].parameters()
 ('xi', 'alpha')
 """
-
-
-def spelled(program: str) -> list[tuple[type[Lens], Spelling]]:
-    """The lenses that a program has, and how it writes them.
-
-    Args:
-        program: The name of a format, such as "kalibr".
-
-    Returns: list of (type of Lens, Spelling). A lens may have several spellings; none for a program that is not known.
-
-    >>> [(lens.__name__, spelling.model) for lens, spelling in spelled("ros")][:2]
-    [('BrownConrady', 'plumb_bob'), ('BrownConrady', 'rational_polynomial')]
-    """
-    return [(lens, each) for lens in LENSES.values() for each in lens.spellings if each.program == program]
-
-
-def calibration_models() -> dict[str, tuple[type[Lens], CalibrationModel]]:
-    """The models that can be calibrated, by name, each with its lens.
-
-    Returns: dict of str to (type of Lens, CalibrationModel), by the names that `camviz calibrate --model` takes.
-
-    >>> lens, model = calibration_models()["fisheye"]
-    >>> lens.__name__, model.parameters
-    ('KannalaBrandt', 'k1 k2 k3 k4')
-    """
-    return {each.name: (lens, each) for lens in LENSES.values() for each in lens.calibrations}
 
 
 def same_lenses(lens: Lens) -> Iterator[tuple[Lens, float]]:

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from camviz.lenses.base import Array, Lens, check_parameters, check_range, up_to
-from camviz.lenses.declarations import Example, Spelling
 
 
 class Fisheye(Lens):
@@ -56,12 +55,6 @@ class Equidistant(Fisheye):
     array([0.5236, 1.5708, 3.1416])
     """
 
-    spellings = (
-        Spelling("colmap", "SIMPLE_FISHEYE", "f cx cy", number=14),
-        Spelling("colmap", "FISHEYE", "fx fy cx cy", number=15),
-    )
-    examples = (Example("", (), 180),)
-
     def radial(self, theta: ArrayLike) -> Array:
         return np.asarray(theta, dtype=float)
 
@@ -78,8 +71,6 @@ class Equisolid(Fisheye):
     >>> round(float(Equisolid().radial(np.pi / 2)), 4)  # half a sphere of 2π sr: a disc of area 2π
     1.4142
     """
-
-    examples = (Example("", (), 180),)
 
     def radial(self, theta: ArrayLike) -> Array:
         return 2 * np.sin(np.asarray(theta, dtype=float) / 2)
@@ -98,8 +89,6 @@ class Orthographic(Fisheye):
     array([[0.7071, 0.    ],
            [   nan,    nan]])
     """
-
-    examples = (Example("", (), 90),)
 
     @property
     def max_angle(self) -> float:
@@ -121,9 +110,6 @@ class Stereographic(Fisheye):
     >>> round(float(Stereographic().radial(np.pi / 2)), 4)  # 2 tan 45°
     2.0
     """
-
-    spellings = (Spelling("mrcal", "LENSMODEL_STEREOGRAPHIC", "fx fy cx cy"),)
-    examples = (Example("", (), 180),)
 
     def radial(self, theta: ArrayLike) -> Array:
         return 2 * np.tan(np.asarray(theta, dtype=float) / 2)
@@ -160,18 +146,6 @@ class FieldOfView(Fisheye):
     """
 
     omega: float
-
-    spellings = (
-        Spelling("basalt", "fov", "fx fy cx cy omega"),
-        Spelling("colmap", "FOV", "fx fy cx cy omega", number=7),
-        Spelling("kalibr", "pinhole fov", "fx fy cx cy omega"),
-        Spelling("svo", "pinhole fisheye", "fx fy cx cy omega"),
-    )
-    examples = (Example("", (0.93,), 180), Example("weak", (1e-6,), 89), Example("strong", (3.0,), 180))
-    invalid = (
-        ((0,), "omega must be an angle between 0 and π radians, got 0"),
-        ((pi,), "omega must be an angle between 0 and π radians, got 3.14"),
-    )
 
     def __post_init__(self) -> None:
         check_parameters(self)

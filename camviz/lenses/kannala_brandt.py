@@ -9,8 +9,7 @@ from math import inf, pi, sqrt
 import numpy as np
 
 from camviz.lenses.arrays import AnglesLike
-from camviz.lenses.base import Array, check_parameters
-from camviz.lenses.declarations import CalibrationModel, Example, Fold, Spelling
+from camviz.lenses.base import Array, Fold, check_parameters
 from camviz.lenses.fisheye import Equidistant, Fisheye
 from camviz.lenses.folding import first_positive_root, solve_rising
 
@@ -36,39 +35,6 @@ class KannalaBrandt(Fisheye):
     k3: float = 0.0
     k4: float = 0.0
 
-    spellings = (
-        Spelling("basalt", "kb4", "fx fy cx cy k1 k2 k3 k4"),
-        Spelling("camodocal", "KANNALA_BRANDT", "fx fy cx cy k1 k2 k3 k4"),
-        Spelling("colmap", "OPENCV_FISHEYE", "fx fy cx cy k1 k2 k3 k4", number=5),
-        Spelling("colmap", "SIMPLE_RADIAL_FISHEYE", "f cx cy k1", number=8),
-        Spelling("colmap", "RADIAL_FISHEYE", "f cx cy k1 k2", number=9),
-        Spelling("euroc", "equidistant", "fx fy cx cy k1 k2 k3 k4"),
-        Spelling("kalibr", "pinhole equidistant", "fx fy cx cy k1 k2 k3 k4"),
-        Spelling("metashape", "fisheye", "fx fy cx cy skew k1 k2 k3 k4"),
-        Spelling("nerfstudio", "OPENCV_FISHEYE", "fx fy cx cy k1 k2 k3 k4"),
-        Spelling("okvis", "equidistant", "fx fy cx cy k1 k2 k3 k4"),
-        Spelling("opensfm", "fisheye", "f cx cy k1 k2"),
-        Spelling("opensfm", "fisheye_opencv", "fx fy cx cy k1 k2 k3 k4"),
-        Spelling("opencv", "cv2.fisheye", "fx fy cx cy k1 k2 k3 k4"),
-        Spelling("orbslam", "KannalaBrandt8", "fx fy cx cy k1 k2 k3 k4"),
-        Spelling("ros", "equidistant", "fx fy cx cy k1 k2 k3 k4"),
-        Spelling("stella", "fisheye", "fx fy cx cy k1 k2 k3 k4"),
-        Spelling("svo", "pinhole equidistant", "fx fy cx cy k1 k2 k3 k4"),
-    )
-    calibrations = (
-        CalibrationModel(
-            "fisheye",
-            "Kannala-Brandt",
-            "k1 k2 k3 k4",
-            "k1 k2 k3 k4 of Kannala and Brandt, as cv2.fisheye has it",
-            "fisheye.calibrate",
-        ),
-    )
-    examples = (
-        Example("", (0.00693023, -0.0013828, -0.000272596, -0.000452646), 100),
-        Example("folding", (-0.1,), 100),
-        Example("none", (), 180),
-    )
     plain = Equidistant
 
     def __post_init__(self) -> None:

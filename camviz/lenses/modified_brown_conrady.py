@@ -5,9 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
-from camviz.lenses.base import Array, Lens, check_parameters
+from camviz.lenses.base import Array, Fold, Lens, check_parameters
 from camviz.lenses.brown_conrady import BrownConrady
-from camviz.lenses.declarations import Example, Fold
 from camviz.lenses.folding import UNBOUNDED
 from camviz.lenses.perspective import Perspective
 
@@ -40,11 +39,6 @@ class ModifiedBrownConrady(Lens):
     p2: float = 0.0
     k3: float = 0.0
 
-    examples = (
-        Example("", (0.18, -0.53, -1.4e-3, 1.2e-4, 0.47), 30),
-        Example("barrel", (-0.28, 0.07, 2e-3, -1e-3, 0.01), 55),
-        Example("only_tangential", (0, 0, 0.05, -0.02), 40),
-    )
     plain = Perspective
     may_mirror = True
 

@@ -6,7 +6,6 @@ from math import pi
 import numpy as np
 
 from camviz.lenses.base import Array, Lens, up_to
-from camviz.lenses.declarations import Example, Spelling
 
 
 @dataclass(frozen=True)
@@ -22,11 +21,6 @@ class Equirectangular(Lens):
            [0.    , 1.5708]])
     """
 
-    spellings = (
-        Spelling("metashape", "spherical", "fx fy cx cy skew"),
-        Spelling("mrcal", "LENSMODEL_LONLAT", "fx fy cx cy"),
-    )
-    examples = (Example("", (), 180),)
     goes_round = True
 
     def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
@@ -53,8 +47,6 @@ class Cylindrical(Lens):
            [ 0.6435, -0.4   ]])
     """
 
-    spellings = (Spelling("metashape", "cylindrical", "fx fy cx cy skew"),)
-    examples = (Example("", (), 89),)
     goes_round = True
 
     def image(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:

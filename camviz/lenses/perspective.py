@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from camviz.lenses.base import Array, Lens
-from camviz.lenses.declarations import Example, Spelling
 
 
 @dataclass(frozen=True)
@@ -18,17 +17,6 @@ class Perspective(Lens):
     array([[0.25, 0.5 ],
            [ nan,  nan]])
     """
-
-    spellings = (
-        Spelling("basalt", "pinhole", "fx fy cx cy"),
-        Spelling("colmap", "SIMPLE_PINHOLE", "f cx cy", number=0),
-        Spelling("colmap", "PINHOLE", "fx fy cx cy", number=1),
-        Spelling("kalibr", "pinhole none", "fx fy cx cy"),
-        Spelling("kitti", "P", "fx fy cx cy skew"),
-        Spelling("svo", "pinhole none", "fx fy cx cy"),
-        Spelling("mrcal", "LENSMODEL_PINHOLE", "fx fy cx cy"),
-    )
-    examples = (Example("", (), 89),)
 
     @property
     def is_distorted(self) -> bool:

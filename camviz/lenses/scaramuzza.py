@@ -7,8 +7,7 @@ from math import inf
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.lenses.base import Array, check_parameters, check_range, up_to
-from camviz.lenses.declarations import Example, Fold
+from camviz.lenses.base import Array, Fold, check_parameters, check_range, up_to
 from camviz.lenses.fisheye import Fisheye
 from camviz.lenses.folding import first_positive_root, solve_rising
 
@@ -42,13 +41,6 @@ class Scaramuzza(Fisheye):
     c: float = 1.0
     d: float = 0.0
     e: float = 0.0
-
-    examples = (
-        Example("fisheye", (-0.35, 0.02, -0.03), 100),
-        Example("stretched", (-0.35, 0.02, -0.03, 0.0, 0.0, 1.001, -0.0008, 0.0003), 100),
-        Example("pinhole", (), 85),
-    )
-    invalid = (((0, 0, 0, 0, 0, 0), "c must be such that c - d e is positive, got 0"),)
 
     def __post_init__(self) -> None:
         check_parameters(self)

@@ -8,9 +8,8 @@ from math import atan2, inf, isfinite, sqrt
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from camviz.lenses.base import NO_DENOMINATOR, ROUNDING, Array, Lens, check_parameters, check_range
+from camviz.lenses.base import NO_DENOMINATOR, ROUNDING, Array, Fold, Lens, check_parameters, check_range
 from camviz.lenses.brown_conrady import BrownConrady
-from camviz.lenses.declarations import CalibrationModel, Example, Fold, Spelling
 
 
 @dataclass(frozen=True)
@@ -38,30 +37,6 @@ class UnifiedSphere(Lens):
     k2: float = 0.0
     p1: float = 0.0
     p2: float = 0.0
-
-    spellings = (
-        Spelling("camodocal", "MEI", "xi fx fy cx cy k1 k2 p1 p2"),
-        Spelling("kalibr", "omni none", "xi fx fy cx cy"),
-        Spelling("kalibr", "omni radtan", "xi fx fy cx cy k1 k2 p1 p2"),
-        Spelling("opencv", "cv2.omnidir", "fx fy cx cy skew k1 k2 p1 p2 xi"),
-    )
-    calibrations = (
-        CalibrationModel(
-            "omni",
-            "unified sphere",
-            "xi k1 k2 p1 p2",
-            "xi k1 k2 p1 p2 of the unified sphere, as cv2.omnidir has it",
-            "omnidir.calibrate",
-        ),
-    )
-    examples = (
-        Example("pinhole", (0,), 89),
-        Example("hyperbolic", (0.8,), 140),
-        Example("parabolic", (1,), 170),
-        Example("beyond", (2.5,), 110),
-        Example("distorted", (0.9, -0.1, 0.02, 1e-3, -2e-3), 90),
-    )
-    invalid = (((-0.1,), "xi must be at least 0, got -0.1"),)
 
     def __post_init__(self) -> None:
         check_parameters(self)
@@ -148,23 +123,6 @@ class ExtendedUnified(Lens):
     alpha: float
     beta: float
 
-    spellings = (
-        Spelling("basalt", "ucm", "fx fy cx cy alpha", {"beta": 1.0}),
-        Spelling("basalt", "eucm", "fx fy cx cy alpha beta"),
-        Spelling("colmap", "EUCM", "fx fy cx cy alpha beta", number=16),
-        Spelling("kalibr", "eucm none", "alpha beta fx fy cx cy"),
-    )
-    examples = (
-        Example("", (0.6, 1.1), 120),
-        Example("narrow", (0.3, 0.5), 100),
-        Example("orthographic", (1, 1), 90),
-        Example("pinhole", (0, 2), 89),
-    )
-    invalid = (
-        ((1.1, 1), "alpha must be between 0 and 1, got 1.1"),
-        ((0.5, 0), "beta must be positive, got 0"),
-    )
-
     def __post_init__(self) -> None:
         check_parameters(self)
         check_range("alpha", self.alpha, 0 <= self.alpha <= 1, "between 0 and 1")
@@ -201,21 +159,6 @@ class DoubleSphere(Lens):
 
     xi: float
     alpha: float
-
-    spellings = (
-        Spelling("basalt", "ds", "fx fy cx cy xi alpha"),
-        Spelling("kalibr", "ds none", "xi alpha fx fy cx cy"),
-    )
-    examples = (
-        Example("", (-0.2, 0.6), 120),
-        Example("low_alpha", (-0.5, 0.2), 75),
-        Example("positive", (0.5, 0.4), 110),
-        Example("one", (1, 1), 130),
-    )
-    invalid = (
-        ((-1, 0.5), "xi must be above -1 and at most 1, got -1"),
-        ((0, -0.1), "alpha must be between 0 and 1, got -0.1"),
-    )
 
     def __post_init__(self) -> None:
         check_parameters(self)

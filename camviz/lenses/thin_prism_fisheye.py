@@ -7,9 +7,8 @@ from math import inf, pi
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from camviz.lenses.base import Array, Lens, check_parameters
+from camviz.lenses.base import Array, Fold, Lens, check_parameters
 from camviz.lenses.brown_conrady import BrownConrady
-from camviz.lenses.declarations import Example, Fold, Spelling
 from camviz.lenses.fisheye import Equidistant
 
 _EQUIDISTANT = Equidistant()
@@ -45,12 +44,6 @@ class ThinPrismFisheye(Lens):
     k4: float = 0.0
     sx1: float = 0.0
     sy1: float = 0.0
-
-    spellings = (Spelling("colmap", "THIN_PRISM_FISHEYE", "fx fy cx cy k1 k2 p1 p2 k3 k4 sx1 sy1", number=10),)
-    examples = (
-        Example("", (0.02, -0.01, 1e-3, -5e-4, 2e-3, -3e-4, 1e-3, -2e-3), 100),
-        Example("folding", (-0.1, 0, 1e-3, 0, 0, 0, 2e-3), 100),
-    )
 
     def __post_init__(self) -> None:
         check_parameters(self)

@@ -259,8 +259,3 @@ def _rays(pixels: Intrinsics, lens: Lens) -> tuple[tuple[Rays, ...], float]:
 
 
 _kept_rays = lru_cache(maxsize=1)(_rays)  # while the camera only moves; one, for a class shares one memory
-
-
-def forget_rays() -> None:
-    """Free the rays that are kept from one picture of a camera to the next: 2 MB or more, made in some milliseconds."""
-    _kept_rays.cache_clear()

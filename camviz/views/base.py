@@ -167,11 +167,6 @@ class View:
         """The same view with some fields changed."""
         return replace(self, **changes)
 
-    def forget(self) -> None:
-        """Free what this view has worked out (its cached properties), until it is asked for it again."""
-        for name in self._worked_out:
-            del vars(self)[name]
-
     def dragged(self, handle: str, x: float, y: float, dx: float, dy: float) -> Self:
         """The view after the pointer dragged `handle` by (dx, dy) to (x, y), in the picture's units."""
         return self

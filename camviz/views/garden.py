@@ -65,13 +65,6 @@ def looked_up(picture: np.ndarray, uv: Array, side: float) -> np.ndarray:
     return cv2.remap(picture, places.astype(np.float32), None, cv2.INTER_LINEAR, borderValue=NOTHING)
 
 
-def forget() -> None:
-    """Free the garden, which is laid out anew in 80 ms, and what is kept of it until the camera changes."""
-    textured_scene.cache_clear()
-    _taken.cache_clear()
-    _distances.cache_clear()
-
-
 def landmarks(camera: Camera) -> Array:
     """Points (n, 3) of the garden's surfaces, none farther than 12 m, all over a camera's picture."""
     return _landmarks(camera.intrinsics, camera.lens, _pose(camera))

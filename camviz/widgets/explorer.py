@@ -18,7 +18,6 @@ from IPython import get_ipython
 from camviz.draw.picture import page_style
 from camviz.views.base import Control, View
 from camviz.widgets.change_request import ChangeRequest, number_of
-from camviz.widgets.memory import give_back_after_cells, keep_between_pictures
 from camviz.widgets.still import StillWidget, stills_for_boxes
 from camviz.widgets.waiting import wait
 
@@ -102,8 +101,6 @@ class Explorer(StillWidget):
         super().__init__()
         self.on_msg(self._receive)
         self.observe(lambda _: self.keep_soon(), "view")
-        keep_between_pictures()
-        give_back_after_cells(self)
         wait(self)
         stills_for_boxes()
 
@@ -214,11 +211,6 @@ class Explorer(StillWidget):
             self._first = self._first.but(**changes)
             self._show(self.view.but(**changes), draft=False)
         return bool(changes)
-
-    def forget(self) -> None:
-        """Free what the first and the present view have worked out; a hand's next picture is of another view."""
-        self._first.forget()
-        self.view.forget()
 
     def _tell(self, error: Exception, answers: int) -> None:
         """Show an error above the last good picture."""

@@ -15,7 +15,7 @@ _HOME = {
     "detect": "detection",
     "detect_pair": "detection",
     "find_corners": "finding",
-    "MODELS": "solving",
+    "MODELS": "camera_models",
     "calibrate": "solving",
     "calibrate_pair": "solving",
 }

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.lenses import calibration_models
 from camviz.lenses.base import Array
+from camviz_clinic.calibration.camera_models import MODELS
 from camviz_clinic.calibration.difference import pixel_grid
 from camviz_clinic.calibration.jacobian import parameter, pixel_jacobian, with_parameters
 
@@ -35,7 +35,7 @@ class LensFit:
 
 
 def fit_lens(camera: Camera, model: str) -> LensFit:
-    """The camera of one of `calibration_models` by least squares of the pixels that its rays come to.
+    """The camera of one of `MODELS` by least squares of the pixels that its rays come to.
 
     Raises ValueError for an unknown model, and where no ray of the camera has an image in it.
 
@@ -44,19 +44,18 @@ def fit_lens(camera: Camera, model: str) -> LensFit:
     >>> type(fit.camera.lens).__name__, fit.worst < 0.05
     ('KannalaBrandt', True)
     """
-    models = calibration_models()
-    if model not in models:
-        raise ValueError(f"model must be one of {', '.join(models)}, got {model!r}")
-    lens, says = models[model]
-    names = says.parameters.split()
+    if model not in MODELS:
+        raise ValueError(f"model must be one of {', '.join(MODELS)}, got {model!r}")
+    wanted = MODELS[model]
+    lens, names = wanted.lens, wanted.coefficients.split()
     start: dict[str, Any] = {name: 1.0 for name in lens.parameters() if not hasattr(lens, name)}  # has no default
-    start |= dict(zip(names, says.start, strict=False))
+    start |= dict(zip(names, wanted.start, strict=False))
     uv = pixel_grid(camera.intrinsics, FITTED_ON).reshape(-1, 2)
     rays = camera.lens.unproject(camera.intrinsics.from_pixels(uv))
     first = replace(camera, intrinsics=_start(camera, lens(**start)), lens=lens(**start))
     seen = np.isfinite(rays).all(axis=1) & np.isfinite(first.lens.project_unchecked(rays)).all(axis=1)
     if seen.sum() < 4 + len(names):
-        raise ValueError(f"{says.title} has no image of the rays of this camera")
+        raise ValueError(f"{wanted.title} has no image of the rays of this camera")
     return _judged(camera, _solved(first, ["fx", "fy", "cx", "cy", *names], rays[seen], uv[seen]))
 
 

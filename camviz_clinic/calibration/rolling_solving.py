@@ -15,9 +15,9 @@ from camviz.poses import RigidTransform
 from camviz_clinic.calibration.clustered import FEWEST_VIEWS
 from camviz_clinic.calibration.detection import CannotCalibrate, Detections, seen
 from camviz_clinic.calibration.line_delay import LineDelay
-from camviz_clinic.calibration.models import pose_from_rays
 from camviz_clinic.calibration.outliers import FINEST, furthest
 from camviz_clinic.calibration.rolling_shutter import RollingAdjustment
+from camviz_clinic.calibration.solvers import pose_from_rays
 from camviz_clinic.calibration.trajectory import ORDER, Trajectory
 from camviz_clinic.calibration.types import Board, Calibration
 

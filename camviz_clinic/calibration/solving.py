@@ -13,14 +13,13 @@ from camviz.cameras import Camera
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.board_warp import check_board_warp, with_board_warp
+from camviz_clinic.calibration.camera_models import MODELS, CameraModel
 from camviz_clinic.calibration.detection import CannotCalibrate, Detections, seen
 from camviz_clinic.calibration.jacobian import with_parameters
-from camviz_clinic.calibration.models import MODELS, CameraModel, Views, poses_from_rays
 from camviz_clinic.calibration.outliers import Masks, outliers, sentences
 from camviz_clinic.calibration.regularisation import regularised, with_priors
+from camviz_clinic.calibration.solvers import Views, poses_from_rays, solve_with_opencv
 from camviz_clinic.calibration.types import Board, Calibration, Mask
-
-__all__ = ["MODELS", "calibrate", "calibrate_pair"]
 
 FEWEST_VIEWS = 3
 MOST_ROUNDS = 20
@@ -190,7 +189,8 @@ def _solved(
     use = np.asarray((there & ~aside).any(axis=1))
     size = detections.width, detections.height
     try:
-        camera, poses = kind.solve(Views.of(board, detections.corners[use], (there & ~aside)[use], *size), fixed)
+        views = Views.of(board, detections.corners[use], (there & ~aside)[use], *size)
+        camera, poses = solve_with_opencv(kind, views, fixed)
         middle = {"cx": (size[0] - 1) / 2, "cy": (size[1] - 1) / 2}
         camera = with_parameters(camera, {parameter: middle.get(parameter, 0.0) for parameter in fixed})
         if use.all():

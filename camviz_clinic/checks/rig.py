@@ -12,7 +12,7 @@ from camviz.cameras import Camera
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.adjustment import Adjustment
-from camviz_clinic.calibration.models import poses_from_rays
+from camviz_clinic.calibration.solvers import poses_from_rays
 from camviz_clinic.calibration.types import Board, Calibration
 
 DECLARED = (("left", "right"), ("P0", "P1"), ("P2", "P3"), ("00", "01"), ("02", "03"))  # the last four are KITTI's

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from camviz.lenses import calibration_models
+from camviz_clinic.calibration.camera_models import MODELS
 from camviz_clinic.commands.boards import add_board, board_of
 from camviz_clinic.commands.common import (
     Refusal,
@@ -65,7 +65,6 @@ lists. --board, --square-mm and --size say what those files do not hold. IMAGES 
 The pictures of a pair belong together by their names (left/007.png and right/007.png), else by the last number in them
 (left07.jpg and right07.jpg), else by their order. So do the views in files of corners, but not by their order.
 """
-MODELS = {name: model.says for name, (_, model) in calibration_models().items()}
 EXAMPLES = """\
 examples:
   camviz calibrate left*.jpg --board 9x6 --square-mm 25 --report report.html
@@ -100,7 +99,7 @@ def add(commands: Any) -> None:
         "calibrate a camera, a pair or a rig from pictures or films",
         f"{CALIBRATE}\n{FILMS}\n{ROLLING}\n{RIG}\n{BOARDS}",
     )
-    models = "".join(f"  {name:11} {says}\n" for name, says in MODELS.items())
+    models = "".join(f"  {name:11} {model.help}\n" for name, model in MODELS.items())
     command.epilog = f"models:\n{models}\n{EXAMPLES}\n{GATE}\n{STATUS}"
     command.add_argument("images", metavar="IMAGES", nargs="*", help="pictures, films, folders of them, or patterns")
     command.add_argument(

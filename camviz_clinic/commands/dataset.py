@@ -7,8 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from camviz_clinic.calibration.camera_models import MODELS
 from camviz_clinic.commands.boards import add_board
-from camviz_clinic.commands.calibrate import MODELS, add_seconds, report
+from camviz_clinic.commands.calibrate import add_seconds, report
 from camviz_clinic.commands.common import (
     OK,
     Refusal,

@@ -14,14 +14,15 @@ from camviz.lenses import BrownConrady, KannalaBrandt, UnifiedSphere
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format
-from camviz_clinic.files.models import expressed, models_of
+from camviz_clinic.files.models import expressed
+from camviz_clinic.files.parameter_layouts import LAYOUTS
 from camviz_clinic.files.section import Section, Size, agreed_size, explained
 from camviz_clinic.files.tables import parse_toml
 from camviz_clinic.files.text import HEAD
 from camviz_clinic.files.trees import shown
 
 TITLE = "anipose TOML"
-MODELS = [model for model in models_of("opencv") if model.lens is not UnifiedSphere]
+MODELS = [model for model in LAYOUTS["opencv"] if model.lens is not UnifiedSphere]
 _MATRIX = re.compile(r"^[ \t]*matrix[ \t]*=[ \t]*\[", re.MULTILINE)
 
 

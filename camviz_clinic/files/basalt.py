@@ -8,11 +8,12 @@ from camviz.cameras import Camera
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format, by_imu, chosen, listed
-from camviz_clinic.files.models import Model, expressed, models_of
+from camviz_clinic.files.models import Model, expressed
 from camviz_clinic.files.output import as_json
+from camviz_clinic.files.parameter_layouts import LAYOUTS
 from camviz_clinic.files.section import Section, Size, as_size
 
-MODELS = models_of("basalt")
+MODELS = LAYOUTS["basalt"]
 KEYS = {"omega": "w"}
 
 

@@ -6,13 +6,14 @@ from typing import Any
 
 from camviz_clinic.calibration.types import Calibration
 from camviz_clinic.files.format import File, Format, chosen, listed, parameters_of
-from camviz_clinic.files.models import expressed, models_of
+from camviz_clinic.files.models import expressed
 from camviz_clinic.files.opencv import image_size
 from camviz_clinic.files.output import as_opencv
+from camviz_clinic.files.parameter_layouts import LAYOUTS
 from camviz_clinic.files.section import Section
 
 TITLE = "camodocal camera"
-MODELS = models_of("camodocal")
+MODELS = LAYOUTS["camodocal"]
 PARTS = ("mirror_parameters", "distortion_parameters", "projection_parameters")
 MEI = {"fx": "gamma1", "fy": "gamma2", "cx": "u0", "cy": "v0"}
 KANNALA_BRANDT = {"fx": "mu", "fy": "mv", "cx": "u0", "cy": "v0", "k1": "k2", "k2": "k3", "k3": "k4", "k4": "k5"}

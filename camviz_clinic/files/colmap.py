@@ -13,7 +13,8 @@ from camviz.cameras import Camera
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format, listed
-from camviz_clinic.files.models import Model, expressed, model_named, models_of
+from camviz_clinic.files.models import Model, expressed, model_named
+from camviz_clinic.files.parameter_layouts import LAYOUTS
 from camviz_clinic.files.section import COUNT, LARGEST, ROTATION_TOLERANCE, Section, agreed_size, named
 from camviz_clinic.files.text import HEAD, MAX_BYTES, open_bounded, read_bytes, text_of
 from camviz_clinic.files.trees import scalar, shown
@@ -22,7 +23,7 @@ FIRST_PIXEL = 0.5  # "the upper left corner is (0, 0), the centre of the first p
 MAX_IMAGES = 100_000
 MOST_WORDS = 32  # more than any line of cameras.txt has
 MODELS = {  # by COLMAP's number for it (colmap/sensor/models.h)
-    model.number: model for model in sorted(models_of("colmap"), key=lambda model: model.number)
+    model.number: model for model in sorted(LAYOUTS["colmap"], key=lambda model: model.number)
 }
 # What every COLMAP reads, and EUCM of its newest releases; their plain fisheyes are written as OPENCV_FISHEYE.
 WRITTEN = [model for number, model in MODELS.items() if number not in (14, 15)]

@@ -6,13 +6,14 @@ from typing import Any
 
 from camviz_clinic.calibration.types import Calibration
 from camviz_clinic.files.format import File, Format, chosen, coefficients_of, listed
-from camviz_clinic.files.models import expressed, models_of
+from camviz_clinic.files.models import expressed
 from camviz_clinic.files.output import as_matrix, as_yaml
+from camviz_clinic.files.parameter_layouts import LAYOUTS
 from camviz_clinic.files.section import agreed_size
 from camviz_clinic.files.trees import shown
 
 TITLE = "EuRoC sensor.yaml"
-MODELS = models_of("euroc")
+MODELS = LAYOUTS["euroc"]
 
 
 def is_sensor(file: File) -> bool:

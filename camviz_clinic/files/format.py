@@ -21,7 +21,6 @@ from camviz_clinic.files.trees import parse, shown
 
 Content = bytes | dict[str, bytes]  # of a file, or of the files of a folder by name
 
-GRID = "fx fy cx cy"
 OPENCV_ORDER = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 NO_KEYS: Mapping[str, str] = MappingProxyType({})
 _KINDS = {list: "a list", str: "plain text", type(None): "nothing but comments"}

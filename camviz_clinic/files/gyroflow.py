@@ -11,8 +11,8 @@ from camviz.lenses import BrownConrady, KannalaBrandt, Perspective, UnifiedSpher
 from camviz_clinic.calibration.line_delay import LineDelay
 from camviz_clinic.calibration.stamp import Stamp, word
 from camviz_clinic.calibration.types import Calibration, CalibrationError
-from camviz_clinic.files.format import GRID, File, Format, listed
-from camviz_clinic.files.models import Model, expressed
+from camviz_clinic.files.format import File, Format, listed
+from camviz_clinic.files.models import GRID, Model, expressed
 from camviz_clinic.files.output import as_json
 from camviz_clinic.files.section import Section, Size, agreed_size
 

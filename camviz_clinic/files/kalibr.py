@@ -14,9 +14,10 @@ from camviz.poses import RigidTransform
 from camviz_clinic.calibration.redundancy import Redundancy, between_transforms, compared
 from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format, coefficients_of
-from camviz_clinic.files.models import Model, expressed, models_of
+from camviz_clinic.files.models import Model, expressed
 from camviz_clinic.files.opencv import image_size
 from camviz_clinic.files.output import as_rows, as_yaml
+from camviz_clinic.files.parameter_layouts import LAYOUTS
 from camviz_clinic.files.redundant import rigid
 from camviz_clinic.files.section import Section, Size
 from camviz_clinic.files.trees import shown
@@ -26,7 +27,7 @@ SAME = 0.1  # ° or mm: transforms that are no farther apart are one
 WORDS = ("camera_model", "distortion_model")
 SYNONYMS = {"equi": "equidistant", "radial-tangential": "radtan"}
 TITLE = "Kalibr camchain"
-MODELS = models_of("kalibr")  # camera_model and distortion_model; Kalibr's fu fv pu pv are fx fy cx cy, its w is omega
+MODELS = LAYOUTS["kalibr"]  # camera_model and distortion_model; Kalibr's fu fv pu pv are fx fy cx cy, its w is omega
 
 
 def read(file: File) -> Calibration:

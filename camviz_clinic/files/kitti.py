@@ -13,12 +13,13 @@ from camviz.lenses import Perspective
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format
-from camviz_clinic.files.models import expressed, models_of
+from camviz_clinic.files.models import expressed
+from camviz_clinic.files.parameter_layouts import LAYOUTS
 from camviz_clinic.files.section import Section, agreed_size
 from camviz_clinic.files.trees import scalar, shown
 
 TITLE = "KITTI calib.txt"
-MODELS = models_of("kitti")
+MODELS = LAYOUTS["kitti"]
 MAX_LINES = 1000
 MOST_WORDS = 64  # more than any line has
 _START = re.compile(r"^(?:P[0-9]|P_rect_[0-9]{2}):[ \t]+[-+.0-9]", re.MULTILINE)

@@ -11,11 +11,12 @@ from camviz.poses import RigidTransform
 from camviz_clinic.calibration.types import Calibration
 from camviz_clinic.files.format import File, Format
 from camviz_clinic.files.kitti import as_lines, lines_of
-from camviz_clinic.files.models import expressed, models_of
+from camviz_clinic.files.models import expressed
+from camviz_clinic.files.parameter_layouts import LAYOUTS
 from camviz_clinic.files.section import agreed_size, explained
 
 TITLE = "KITTI calib_cam_to_cam.txt"
-MODELS = models_of("kitti-raw")
+MODELS = LAYOUTS["kitti-raw"]
 _START = re.compile(r"^K_[0-9]{2}:[ \t]+[-+.0-9]", re.MULTILINE)
 
 

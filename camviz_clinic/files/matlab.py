@@ -14,13 +14,14 @@ from camviz.poses import RigidTransform
 from camviz_clinic.calibration.redundancy import Redundancy, compared
 from camviz_clinic.calibration.types import Calibration
 from camviz_clinic.files.format import File, Format
-from camviz_clinic.files.models import expressed, models_of
+from camviz_clinic.files.models import expressed
 from camviz_clinic.files.output import as_json
+from camviz_clinic.files.parameter_layouts import LAYOUTS
 from camviz_clinic.files.section import Section, Size, agreed_size, explained, refuse_focal_lengths
 
 TITLE = "MATLAB cameraParameters"
 FIRST_PIXEL = 1.0
-MODELS = models_of("matlab")
+MODELS = LAYOUTS["matlab"]
 RADIAL, TANGENTIAL = "RadialDistortion", "TangentialDistortion"
 PAIR = {"camera1": "CameraParameters1", "camera2": "CameraParameters2"}
 METRES = {"mm": 1e-3, "millimeters": 1e-3, "cm": 1e-2, "centimeters": 1e-2, "m": 1.0, "meters": 1.0}

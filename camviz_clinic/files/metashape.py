@@ -11,11 +11,12 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics
 from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format
-from camviz_clinic.files.models import expressed, models_of
+from camviz_clinic.files.models import expressed
+from camviz_clinic.files.parameter_layouts import LAYOUTS
 from camviz_clinic.files.section import Section, Size, agreed_size
 from camviz_clinic.files.trees import shown
 
-MODELS = models_of("metashape")
+MODELS = LAYOUTS["metashape"]
 TYPES = {"frame": 0, "fisheye": 1, "equidistant_fisheye": 1, "spherical": 2, "cylindrical": 3}
 COEFFICIENTS = ("k1", "k2", "k3", "k4", "p1", "p2", "p3", "p4")
 

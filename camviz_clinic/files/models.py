@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.lenses import Lens, same_lenses, spelled
+from camviz.lenses import Lens, same_lenses
 from camviz_clinic.calibration.types import CalibrationError
 from camviz_clinic.files.section import explained, refuse_focal_lengths
+
+GRID = "fx fy cx cy"
 
 
 @dataclass(frozen=True)
@@ -53,11 +55,6 @@ class Model:
         lacking = [name for name in needed if name not in self.names]
         lacking += ["skew"] * (intrinsics.skew != 0 and "skew" not in self.names)
         return lacking + ["fy, which differs from fx,"] * (intrinsics.fx != intrinsics.fy and "f" in self.names)
-
-
-def models_of(program: str) -> list[Model]:
-    """The models of a format, as the lenses declare them."""
-    return [Model(each.model, lens, each.parameters, each.fixed, each.number) for lens, each in spelled(program)]
 
 
 def expressed(name: str, camera: Camera, models: Iterable[Model], title: str) -> tuple[Model, Camera]:

@@ -8,13 +8,14 @@ from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.types import Calibration
 from camviz_clinic.files.format import File, Format, listed
 from camviz_clinic.files.literal import parse_literal
-from camviz_clinic.files.models import expressed, model_named, models_of
+from camviz_clinic.files.models import expressed, model_named
+from camviz_clinic.files.parameter_layouts import LAYOUTS
 from camviz_clinic.files.section import COUNT, Section, agreed_size
 from camviz_clinic.files.text import HEAD
 from camviz_clinic.files.trees import shown
 
 TITLE = "mrcal cameramodel"
-MODELS = models_of("mrcal")
+MODELS = LAYOUTS["mrcal"]
 POSES = ("rt_cam_ref", "extrinsics")  # the second until mrcal 2.4
 _KEY = re.compile(r"""(?:\s|#[^\n]*\n)*\{(?:\s|#[^\n]*\n)*['"](?:lensmodel|[a-z_]+)['"]\s*:""")
 

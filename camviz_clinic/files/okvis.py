@@ -7,12 +7,13 @@ from typing import Any
 from camviz.cameras import Camera
 from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format, by_imu, chosen, coefficients_of, listed
-from camviz_clinic.files.models import expressed, models_of
+from camviz_clinic.files.models import expressed
 from camviz_clinic.files.output import as_yaml
+from camviz_clinic.files.parameter_layouts import LAYOUTS
 from camviz_clinic.files.section import Section, Size, agreed_size
 
 TITLE = "OKVIS configuration"
-MODELS = models_of("okvis")
+MODELS = LAYOUTS["okvis"]
 
 
 def is_configuration(file: File) -> bool:

@@ -13,10 +13,11 @@ from camviz.cameras import Camera
 from camviz.lenses import KannalaBrandt, Perspective
 from camviz_clinic.calibration.stamp import Stamp
 from camviz_clinic.calibration.types import Calibration, CalibrationError
-from camviz_clinic.files.models import expressed, models_of
+from camviz_clinic.files.models import expressed
+from camviz_clinic.files.parameter_layouts import LAYOUTS
 
 GUESSED = ("chessboard", "charuco")  # kinds of boards that the reader knows by their markers
-MODELS = models_of("opencv")
+MODELS = LAYOUTS["opencv"]
 NO_STAMP = Stamp()
 TITLE = "OpenCV FileStorage"
 UNDISTORTED = "undistorted"  # 1 in the file of pinholes, whose zeros are no forgotten coefficients

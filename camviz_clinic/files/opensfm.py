@@ -11,14 +11,15 @@ from camviz.lenses import Equirectangular
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format, chosen, listed, parameters_of
-from camviz_clinic.files.models import expressed, models_of
+from camviz_clinic.files.models import expressed
 from camviz_clinic.files.output import as_json
+from camviz_clinic.files.parameter_layouts import LAYOUTS
 from camviz_clinic.files.section import Section, Size, agreed_size
 from camviz_clinic.files.text import HEAD
 from camviz_clinic.files.trees import parse
 
 TITLE = "OpenSfM"
-MODELS = models_of("opensfm")
+MODELS = LAYOUTS["opensfm"]
 PANORAMAS = ("spherical", "equirectangular")
 KEYS = {"f": "focal", "fx": "focal_x", "fy": "focal_y", "cx": "c_x", "cy": "c_y"}
 CENTRED = ("perspective", "fisheye")  # have no principal point but the middle of the image

@@ -14,12 +14,13 @@ from camviz.poses import RigidTransform
 from camviz_clinic.calibration.redundancy import Redundancy, compared, share
 from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format, parameters_of
-from camviz_clinic.files.models import Model, expressed, models_of
+from camviz_clinic.files.models import Model, expressed
 from camviz_clinic.files.output import as_opencv
+from camviz_clinic.files.parameter_layouts import LAYOUTS
 from camviz_clinic.files.section import Section, Size, agreed_size
 
 TITLE = "ORB-SLAM settings"
-MODELS = models_of("orbslam")
+MODELS = LAYOUTS["orbslam"]
 READ = [*MODELS, Model("Rectified", Perspective, "fx fy cx cy")]
 LEFT_FROM_RIGHT = ("Stereo.T_c1_c2", "Tlr")
 IMU_FROM_LEFT = ("IMU.T_b_c1", "Tbc")

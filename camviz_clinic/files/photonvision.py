@@ -12,8 +12,8 @@ from camviz.lenses import BrownConrady
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
 from camviz_clinic.calibration.types import Board, Calibration, Mask
-from camviz_clinic.files.format import GRID, File, Format
-from camviz_clinic.files.models import Model, expressed
+from camviz_clinic.files.format import File, Format
+from camviz_clinic.files.models import GRID, Model, expressed
 from camviz_clinic.files.output import as_json, as_matrix
 from camviz_clinic.files.section import Section, agreed_size, explained
 from camviz_clinic.files.trees import MAX_NODES, shown

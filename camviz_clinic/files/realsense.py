@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from camviz.cameras import Camera
 from camviz.lenses import BrownConrady, FieldOfView, KannalaBrandt, ModifiedBrownConrady, Perspective
 from camviz_clinic.calibration.types import Calibration
-from camviz_clinic.files.format import GRID, File, Format
-from camviz_clinic.files.models import Model
+from camviz_clinic.files.format import File, Format
+from camviz_clinic.files.models import GRID, Model
 from camviz_clinic.files.section import Section, Size, agreed_size
 from camviz_clinic.files.trees import shown
 

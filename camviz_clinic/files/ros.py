@@ -18,15 +18,16 @@ from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.rectification import Rectification
 from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import Content, File, Format, chosen, listed
-from camviz_clinic.files.models import Model, expressed, models_of
+from camviz_clinic.files.models import Model, expressed
 from camviz_clinic.files.opencv import image_size
 from camviz_clinic.files.output import as_matrix, as_yaml
+from camviz_clinic.files.parameter_layouts import LAYOUTS
 from camviz_clinic.files.section import COUNT, Section, as_rotation, explained, named, without_zeros
 
 TITLE = "ROS CameraInfo"
 MATRIX, DISTORTION = ("camera_matrix", "K", "k"), ("distortion_coefficients", "D", "d")
 RECTIFICATION, PROJECTION = ("rectification_matrix", "R", "r"), ("projection_matrix", "P", "p")
-MODELS = models_of("ros")
+MODELS = LAYOUTS["ros"]
 
 
 def is_camera_info(file: File) -> bool:

@@ -9,12 +9,13 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.lenses import Equirectangular
 from camviz_clinic.calibration.types import Calibration
 from camviz_clinic.files.format import File, Format, parameters_of
-from camviz_clinic.files.models import expressed, models_of
+from camviz_clinic.files.models import expressed
 from camviz_clinic.files.output import as_yaml
+from camviz_clinic.files.parameter_layouts import LAYOUTS
 from camviz_clinic.files.section import Section, agreed_size
 
 TITLE = "stella_vslam configuration"
-MODELS = models_of("stella")
+MODELS = LAYOUTS["stella"]
 NAMES = [*(model.name for model in MODELS), "equirectangular"]
 
 

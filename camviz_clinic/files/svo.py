@@ -6,11 +6,12 @@ from camviz.cameras import Camera
 from camviz.lenses import BrownConrady, FieldOfView, KannalaBrandt, Perspective
 from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format, by_imu, listed
-from camviz_clinic.files.models import Model, models_of
+from camviz_clinic.files.models import Model
+from camviz_clinic.files.parameter_layouts import LAYOUTS
 from camviz_clinic.files.section import COUNT, Section, Size, agreed_size
 
 TITLE = "SVO camera"
-MODELS = {model.name: model for model in models_of("svo")}
+MODELS = {model.name: model for model in LAYOUTS["svo"]}
 FIRST = {  # rpg_svo's: ATAN has fx, fy, cx and cy as fractions of the width and the height
     "Pinhole": (Model("Pinhole", BrownConrady, "fx fy cx cy k1 k2 p1 p2"), "cam_d0 cam_d1 cam_d2 cam_d3"),
     "EquidistantCamera": (Model("EquidistantCamera", KannalaBrandt, "fx fy cx cy k1 k2 k3 k4"), "k1 k2 k3 k4"),

@@ -15,14 +15,15 @@ from camviz.poses import OPENGL
 from camviz_clinic.calibration.redundancy import Redundancy, compared
 from camviz_clinic.calibration.types import Calibration, CalibrationError
 from camviz_clinic.files.format import File, Format
-from camviz_clinic.files.models import expressed, models_of
+from camviz_clinic.files.models import expressed
 from camviz_clinic.files.output import as_json, as_rows
+from camviz_clinic.files.parameter_layouts import LAYOUTS
 from camviz_clinic.files.section import Section, Size, agreed_size, explained, refuse_focal_lengths
 from camviz_clinic.files.trees import shown
 
 TITLE = "transforms.json"
 FIRST_PIXEL = 0.5
-MODELS = models_of("nerfstudio")
+MODELS = LAYOUTS["nerfstudio"]
 STRAIGHT = ("PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE", "SIMPLE_RADIAL", "RADIAL", "OPENCV")
 KEYS = {"fx": "fl_x", "fy": "fl_y"}
 GRID_KEYS = ("w", "h", "fl_x", "fl_y", "cx", "cy", "camera_angle_x", "camera_angle_y")

@@ -19,8 +19,8 @@ from camviz_clinic.calibration.guidance import (
     rim_poses,
     tilt_deg,
 )
-from camviz_clinic.calibration.models import pose_from_rays
 from camviz_clinic.calibration.problem import moved
+from camviz_clinic.calibration.solvers import pose_from_rays
 from camviz_clinic.calibration.types import Board
 from camviz_clinic.calibration.uncertainty import expected_errors
 from camviz_clinic.live.tracking import apart

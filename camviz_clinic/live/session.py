@@ -16,10 +16,11 @@ from camviz.draw.picture import png
 from camviz.lenses.base import Array
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.boards import kind_of
+from camviz_clinic.calibration.camera_models import MODELS
 from camviz_clinic.calibration.detection import CannotCalibrate, Detections
 from camviz_clinic.calibration.finding import find_corners
 from camviz_clinic.calibration.identifiability import undecided_names
-from camviz_clinic.calibration.solving import MODELS, calibrate
+from camviz_clinic.calibration.solving import calibrate
 from camviz_clinic.calibration.stamp import Stamp, now
 from camviz_clinic.calibration.types import Board, Calibration
 from camviz_clinic.checks.summary import GOOD, measured

@@ -11,14 +11,14 @@ from typing import TypeVar
 import numpy as np
 
 from camviz.cameras import Camera
-from camviz.lenses import calibration_models
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform, Rotation
 from camviz_clinic.calibration.adjustment import Adjustment
+from camviz_clinic.calibration.camera_models import MODELS
 from camviz_clinic.calibration.detection import CannotCalibrate, Detections, seen
 from camviz_clinic.calibration.pairing import last_number
 from camviz_clinic.calibration.problem import moved
-from camviz_clinic.calibration.solving import MODELS, calibrate
+from camviz_clinic.calibration.solving import calibrate
 from camviz_clinic.calibration.types import Board, Calibration, Mask
 from camviz_clinic.rigs.graph import Indices, middlemost
 from camviz_clinic.rigs.start import MOST_ALONE, board_poses, varied
@@ -92,11 +92,11 @@ def _anew(board: Board, camera: Camera, corners: Array, estimated: tuple[str, ..
     The joint solution is no beginning for it: what contradicts the others may have bent its lens beyond return.
     """
     free, there = set(estimated), seen(corners)
-    of_lens = {name: set(MODELS[name].parameters) for name in calibration_models()}
+    of_lens = {name: set(model.parameters) for name, model in MODELS.items()}
     fitting = [
         name
-        for name, (lens, _) in calibration_models().items()
-        if isinstance(camera.lens, lens) and free <= of_lens[name] and not {"fx", "fy", "xi"} & (of_lens[name] - free)
+        for name, has in of_lens.items()
+        if isinstance(camera.lens, MODELS[name].lens) and free <= has and not {"fx", "fy", "xi"} & (has - free)
     ]
     views = np.flatnonzero(there.sum(axis=1) >= FEWEST_CORNERS)
     if not fitting or not len(views):

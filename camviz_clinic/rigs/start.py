@@ -14,8 +14,8 @@ from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.boards.charuco import FEWEST
 from camviz_clinic.calibration.denominator_prior import DenominatorPrior
 from camviz_clinic.calibration.detection import CannotCalibrate, Detections, seen
-from camviz_clinic.calibration.models import pose_from_rays
 from camviz_clinic.calibration.problem import moved
+from camviz_clinic.calibration.solvers import pose_from_rays
 from camviz_clinic.calibration.solving import calibrate
 from camviz_clinic.calibration.types import Board, Mask
 from camviz_clinic.rigs.adjustment import RigAdjustment

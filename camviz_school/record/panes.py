@@ -185,7 +185,6 @@ class Explored:
         moved = {axis.name: values[axis.name] for axis in self.axes if values[axis.name] != axis.first}
         panel = moved.pop(PANEL, "")
         if moved != self._moved:
-            self._closed.forget()
             self._moved, self._closed = moved, self._first.but(**self._as_fields(moved)) if moved else self._first
         return self._closed.with_panels({panel: True}) if panel else self._closed
 

@@ -2,7 +2,7 @@
 
 Copy it to `etc/ipython/` in the environment of the kernels (`python -c "import sys; print(sys.prefix)"` names it).
 CAMVIZ_KERNEL_MB sets another limit. It counts what a kernel has asked for, also where it has not written yet: lessons,
-which hold some 190 MB, have asked for up to 750. With a limit of 700 two of them failed.
+which hold 180 to 310 MB, have asked for up to 750. With a limit of 700 two of them failed.
 """
 
 c = get_config()  # noqa: F821  # IPython gives this name to the files that it loads

@@ -23,14 +23,14 @@ from camviz.distortion import (
 )
 from camviz.distortion.limits import NEARLY_A_POLE
 from camviz.lenses import BrownConrady
-from camviz.lenses.base import Array, Lens, on_plane
-from camviz.lenses.declarations import Fold
+from camviz.lenses.base import Array, Fold, Lens, on_plane
 from camviz_clinic.calibration.adjustment import Adjustment
 from camviz_clinic.calibration.enumeration import enumerated
 from camviz_clinic.calibration.types import Calibration
 from camviz_clinic.checks.evidence import Evidence, NotChecked
 from camviz_clinic.checks.registry import Finding, Rng, finding
 from camviz_clinic.checks.virtual import alone, healthy
+from camviz_clinic.files.parameter_layouts import LAYOUTS
 
 LOST = 0.01  # of the pixels, fewer than which may fold
 MAX_FOLDED_BEYOND_CORNERS = 0.1  # of the pixels: a fold that takes more is a fault, wherever corners were seen
@@ -258,7 +258,7 @@ def round_trip(camera: Camera, steps: int | None = None) -> float:
 
 def _opencv_model(lens: Lens) -> str:
     """What OpenCV calls a lens; nothing if it has none such."""
-    return next((each.model for each in lens.spellings if each.program == "opencv"), "")
+    return next((model.name for model in LAYOUTS["opencv"] if model.lens is type(lens)), "")
 
 
 def _criteria(steps: int | None) -> dict[str, Any]:

@@ -155,12 +155,6 @@ def _resampled(image: np.ndarray, original: Camera, camera: Camera, how: int, ou
     return cv2.remap(image, map_uv, None, how, borderValue=outside)
 
 
-def forget() -> None:
-    """Free all pictures and maps of pairs."""
-    for kept in (pictures, _originals, disparities, true_disparities):
-        kept.cache_clear()
-
-
 # Disparities ---------------------------------------------------------------------------------------------------------
 
 

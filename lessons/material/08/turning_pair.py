@@ -114,11 +114,6 @@ class TurningPair(View):
         seen = size.contains(left) & size.contains(right)
         return float(np.abs(left - right)[seen][:, 1].mean()) if seen.any() else float("nan")
 
-    def forget(self) -> None:
-        """Free what this view has worked out, and the pictures and maps of all pairs."""
-        super().forget()
-        stereo_pair.forget()
-
     def disparity_map(self, *, draft: bool = False) -> np.ndarray:
         """What the matcher finds (rows, columns), in pixels of the full picture however coarse; NaN = none."""
         return stereo_pair.disparities(*self._matching(draft))

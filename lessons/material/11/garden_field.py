@@ -45,12 +45,6 @@ def opened_field(fence: bool, width: float) -> LightField:
     return _openings(fence).opened(width)
 
 
-def forget() -> None:
-    """Free the field through openings, 18 MB made in 40 ms."""
-    opened_field.cache_clear()
-    all_views.cache_clear()  # it may hold that field
-
-
 def garden(fence: bool = False) -> Scene:
     """The garden, or the garden behind a fence."""
     plain = textured_scene()

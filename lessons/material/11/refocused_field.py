@@ -101,11 +101,6 @@ class RefocusedField(View):
         """The slope measured at the mark."""
         return float(self.slopes[self.row, self.column])
 
-    def forget(self) -> None:
-        """Free what this view has worked out, and what all light fields of the garden are made of."""
-        super().forget()
-        garden_field.forget()
-
     def image(self) -> np.ndarray:
         """The picture (height, width, 3), sRGB bytes: sheared, then summed."""
         return to_display(refocus(self.light_field, self.slope, self.mask))

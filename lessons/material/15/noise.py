@@ -108,11 +108,6 @@ class PhotonTransferView(View):
         """The electrons that light frees in a pixel of the card, on average."""
         return CARD * WHITE_E_PER_S * self.exposure_s
 
-    def forget(self) -> None:
-        """Free what this view has worked out, and the random numbers."""
-        super().forget()
-        _draw.cache_clear()
-
     def parts(self, electrons: np.ndarray) -> dict[str, np.ndarray]:
         """The deviation of each kind of noise, in DN, on a card that frees so many electrons (n,).
 

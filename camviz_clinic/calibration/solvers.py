@@ -1,9 +1,8 @@
-"""The camera models that can be calibrated, and how OpenCV is asked for each of them."""
+"""How OpenCV is asked for each of the camera models, and where it begins."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -11,14 +10,13 @@ import numpy as np
 
 from camviz.cameras import Camera, Intrinsics
 from camviz.distortion.limits import NEARLY_A_POLE, image_reach, weakest_denominator
-from camviz.lenses import Lens, calibration_models
+from camviz.lenses import Lens
 from camviz.lenses.base import Array, unit
-from camviz.lenses.declarations import CalibrationModel
 from camviz.poses import RigidTransform, Rotation
+from camviz_clinic.calibration.camera_models import CameraModel
 from camviz_clinic.calibration.detection import CannotCalibrate
 from camviz_clinic.calibration.types import Board
 
-PIXELS = ("fx", "fy", "cx", "cy")
 CRITERIA = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, 1e-12)
 FOCAL_LENGTHS = np.geomspace(0.1, 4, 25)  # in image widths, tried as a fisheye's
 
@@ -54,17 +52,12 @@ class Views:
 Solution = tuple[Camera, RigidTransform]  # the poses are cam_from_board, one for each view
 
 
-@dataclass(frozen=True)
-class CameraModel:
-    """A camera model: its lens, the intrinsic parameters that are solved for, and who solves.
-
-    `solve(views, fixed)` need not hold every parameter in `fixed`. A `regularised` model is solved under a prior.
-    """
-
-    title: str
-    parameters: tuple[str, ...]
-    regularised: bool
-    solve: Callable[[Views, tuple[str, ...]], Solution] = field(repr=False)
+def solve_with_opencv(model: CameraModel, views: Views, fixed: tuple[str, ...]) -> Solution:
+    """A model's camera and poses, for an adjustment to begin with; not every parameter in `fixed` need be held."""
+    if not model.solver:
+        return _from_start(model.lens(*model.start), views)
+    flags = getattr(cv2, model.flags) if model.flags else 0
+    return SOLVERS[model.solver](model.lens, flags, views, fixed)
 
 
 def pose_from_rays(rays: Array, points: Array) -> RigidTransform:
@@ -195,23 +188,3 @@ SOLVERS = {
     "fisheye.calibrate": _calibrate_fisheye,
     "omnidir.calibrate": _calibrate_omnidir,
 }
-
-
-def _model(lens: type[Any], declared: CalibrationModel) -> CameraModel:
-    """The model that a lens declares."""
-
-    def solve(views: Views, fixed: tuple[str, ...]) -> Solution:
-        if not declared.solver:
-            return _from_start(lens(*declared.start), views)
-        flags = getattr(cv2, declared.flags) if declared.flags else 0
-        return SOLVERS[declared.solver](lens, flags, views, fixed)
-
-    return CameraModel(declared.title, (*PIXELS, *declared.parameters.split()), declared.regularised, solve)
-
-
-MODELS = {name: _model(lens, declared) for name, (lens, declared) in calibration_models().items()}
-"""The camera models that can be calibrated, by the names that `camviz calibrate --model` takes.
-
->>> MODELS["fisheye"].parameters
-('fx', 'fy', 'cx', 'cy', 'k1', 'k2', 'k3', 'k4')
-"""
