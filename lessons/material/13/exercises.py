@@ -230,6 +230,12 @@ def cut_off_in_between(raw, gains, matrix):
     return np.clip(np.clip(raw * gains, 0, 1) @ matrix.T, 0, 1) ** (1 / 2.2)
 
 
+@DEVELOP.wrong("The order is right. This is the curve of sRGB; here take the plain power 1/2.2.")
+def with_the_curve_of_srgb(raw, gains, matrix):
+    light = np.clip((raw * gains) @ matrix.T, 0, 1)
+    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+
+
 # 4: the matrix -------------------------------------------------------------------------------------------------------
 
 

@@ -72,6 +72,11 @@ def only_the_electrons_squared(electrons, read_noise, prnu):
     return np.sqrt(read_noise**2 + electrons + prnu * electrons**2)
 
 
+@NOISE.wrong("The photons are missing. A perfect camera has their noise too: their variance is their mean.")
+def without_the_photons(electrons, read_noise, prnu):
+    return np.sqrt(read_noise**2 + (prnu * electrons) ** 2)
+
+
 # 2: K from four frames ------------------------------------------------------------------------------------------------
 
 
@@ -480,6 +485,11 @@ def without_the_half(dark_noise, efficiency):
 @THRESHOLD.wrong("You divide the dark noise by the efficiency. σ_d is in electrons: find the electrons, then divide.")
 def dark_noise_in_photons(dark_noise, efficiency):
     return 0.5 + np.sqrt((dark_noise / efficiency) ** 2 + 0.25)
+
+
+@THRESHOLD.wrong("You left out the light's own noise. A perfect amplifier would then need no light at all.")
+def noise_in_the_dark_alone(dark_noise, efficiency):
+    return dark_noise / efficiency
 
 
 EXERCISES = (NOISE, GAIN, FLAT_FIELD, MERGE, STRIPES, THRESHOLD)
