@@ -454,6 +454,11 @@ def size_alone(theta, f, xi, other):
     return np.abs(apart(theta, f, xi, other))
 
 
+@APART.wrong("The quotient is upside down: the greater ξ needs the greater f, by (1 + other)/(1 + ξ).")
+def quotient_upside_down(theta, f, xi, other):
+    return _radius(theta, f * (1 + xi) / (1 + other), other) - _radius(theta, f, xi)
+
+
 # 6: one polynomial for any mirror -------------------------------------------------------------------------------------
 
 

@@ -73,6 +73,18 @@ def held_at_the_end(picture, tile):
     return picture[v, u, tile[np.minimum(v, tile.shape[0] - 1), np.minimum(u, tile.shape[1] - 1)]]
 
 
+@MOSAIC.wrong("Red and blue have changed places: channel 0 is red.")
+def blue_first(picture, tile):
+    return mosaic(picture[..., ::-1], tile)
+
+
+@MOSAIC.wrong("You stretch one tile over the whole picture. A filter covers one pixel, and the tile repeats.")
+def one_tile_stretched(picture, tile):
+    height, width = picture.shape[:2]
+    v, u = np.mgrid[:height, :width]
+    return picture[v, u, tile[v * tile.shape[0] // height, u * tile.shape[1] // width]]
+
+
 # 3: find the bug in the phase after a crop ---------------------------------------------------------------------------
 
 

@@ -234,6 +234,11 @@ def dead_pixels_in_the_mean(frame, dark, flat):
     return (frame - dark) * np.mean(flat - dark) / np.where(flat > dark, flat - dark, np.nan)
 
 
+@FLAT_FIELD.wrong("You multiplied by the flat, which doubles the shading. Divide by it.")
+def multiplied(frame, dark, flat):
+    return (frame - dark) * (flat - dark) / np.mean(flat - dark)
+
+
 # 4: merge a bracket ---------------------------------------------------------------------------------------------------
 
 
@@ -336,9 +341,15 @@ def weights_from_each_count(electrons, exposures, dark_noise, full_well):
     return _weighed((electrons < full_well) * t**2 / (dark_noise**2 + electrons), electrons / t)
 
 
-@MERGE.wrong("e / t has the variance (σ² + x t) / t². Its t is squared, yours is not.")
-def time_not_squared(electrons, exposures, dark_noise, full_well):
-    return _merged(electrons, exposures, full_well, lambda x, t: t / (dark_noise**2 + x * t))
+@MERGE.wrong("You average electrons. The frames had different times: average e / t, electrons per second.")
+def electrons_averaged(electrons, exposures, dark_noise, full_well):
+    t, usable = _times(electrons, exposures), electrons < full_well
+    return _weighed(usable * t**2 / (dark_noise**2 + _light(electrons, t, usable) * t), electrons)
+
+
+@MERGE.wrong("You weigh by the variance: the noisiest count most. Take its inverse.")
+def weighed_by_the_variance(electrons, exposures, dark_noise, full_well):
+    return _merged(electrons, exposures, full_well, lambda x, t: (dark_noise**2 + x * t) / t**2)
 
 
 # 5: what rows and columns share ---------------------------------------------------------------------------------------

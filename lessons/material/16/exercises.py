@@ -398,16 +398,6 @@ def more_than_half(residuals):
     return _largest(np.linalg.norm(residuals, axis=-1) > 6 * robust_sigma(residuals), share=0.5 + 1e-9)
 
 
-@TRIAGE.wrong("You use a limit in pixels. Corners scatter differently in each set: compare with 6 σ.")
-def a_limit_in_pixels(residuals):
-    return _largest(np.linalg.norm(residuals, axis=-1) > 2.5)
-
-
-@TRIAGE.wrong("You compare each coordinate with 6 σ. Compare the *length*.")
-def coordinate_by_coordinate(residuals):
-    return _largest(np.abs(residuals).max(axis=-1) > 6 * robust_sigma(residuals))
-
-
 @TRIAGE.wrong("Your σ is the standard deviation. A bad view makes it so large that nothing is beyond 6 σ.")
 def by_standard_deviation(residuals):
     return _largest(np.linalg.norm(residuals, axis=-1) > 6 * np.std(residuals))
@@ -418,9 +408,23 @@ def lines_before_views(residuals):
     return min(triage(residuals), 2)
 
 
-@TRIAGE.wrong("You compare each view with its own σ. A bad view then looks normal: take σ from all views together.")
-def each_view_by_itself(residuals):
-    return max(triage(view[None]) for view in residuals)
+@TRIAGE.wrong("You find views, rows and corners. A bad *column* counts as single corners in yours.")
+def without_columns(residuals):
+    off = np.linalg.norm(residuals, axis=-1) > 6 * robust_sigma(residuals)
+    if (off.mean(axis=(1, 2)) >= 0.5).any():
+        return 3
+    return 2 if (off.mean(axis=2) >= 0.5).any() else int(off.any())
+
+
+@TRIAGE.wrong("You tell healthy from sick. The number should say *what* is off.")
+def healthy_or_not(residuals):
+    return int(triage(residuals) > 0)
+
+
+@TRIAGE.wrong("You ask for half of *all* views. One view is enough, and one line of one view.")
+def shares_over_all_views(residuals):
+    off = np.linalg.norm(residuals, axis=-1) > 6 * robust_sigma(residuals)
+    return _largest(off.mean(axis=0, keepdims=True)) if off.any() else 0
 
 
 # 6: the next best view ------------------------------------------------------------------------------------------------
@@ -599,6 +603,16 @@ def least_squares(rays_first, rays_second):
 @ROTATION.wrong("You subtract the mean ray first, as for clouds of points. Rays begin in the camera: subtract nothing.")
 def centred(rays_first, rays_second):
     return implied_rotation(rays_first - rays_first.mean(axis=0), rays_second - rays_second.mean(axis=0))
+
+
+@ROTATION.wrong("Your answer still stretches: leave the singular values out. U and Vᵀ alone are the rotation.")
+def stretch_kept(rays_first, rays_second):
+    return rays_second.T @ rays_first / len(rays_first)
+
+
+@ROTATION.wrong("This is the identity. It is right only if both cameras look the same way.")
+def no_turn(rays_first, rays_second):
+    return np.eye(3)
 
 
 # 8: the delay of a row ------------------------------------------------------------------------------------------------

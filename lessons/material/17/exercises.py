@@ -351,6 +351,11 @@ def f_numbers_as_stops(t, N, S, new_N, new_S):
     return t * 2.0 ** (new_N - N) * S / new_S
 
 
+@SHUTTER.wrong("Now the ISO is squared in place of the aperture. Only the opening is an area.")
+def gain_squared(t, N, S, new_N, new_S):
+    return t * (new_N / N) * (S / new_S) ** 2
+
+
 # 4: the standard's recipe --------------------------------------------------------------------------------------------
 
 
@@ -540,6 +545,16 @@ def cut_off_at_zero(recorded, glare):
     return np.maximum(unveil(recorded, glare), 0)
 
 
+@VEIL.wrong("You put the veil on once more. Solve the equation for the light.")
+def veiled_again(recorded, glare):
+    return (1 - glare) * recorded + glare * np.mean(recorded, axis=(0, 1))
+
+
+@VEIL.wrong("You subtract the darkest value. That is the veil only where the scene has a black.")
+def darkest_value_off(recorded, glare):
+    return (recorded - np.min(recorded, axis=(0, 1))) / (1 - glare)
+
+
 # 9: what an ISO number promises --------------------------------------------------------------------------------------
 
 
@@ -599,6 +614,11 @@ def eighteen_percent_of_the_numbers(lux_s, numbers):
 @SPEED.wrong("You interpolate 10 over the exposures. Find the exposure first, and divide then.")
 def interpolated_speeds(lux_s, numbers):
     return np.interp(118, numbers, 10 / lux_s)
+
+
+@SPEED.wrong("The two lists have changed places: the number 118 is known, and the exposure is wanted.")
+def lists_changed_places(lux_s, numbers):
+    return 10 / np.interp(118, lux_s, numbers)
 
 
 EXERCISES = (LINE_SPREAD, MTF, SHUTTER, STANDARD, SYSTEM, FIELD, FALLOFF, VEIL, SPEED)

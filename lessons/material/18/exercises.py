@@ -91,6 +91,11 @@ def by_slopes(a, b, c, d):
     return point if np.isfinite(point).all() else NOWHERE
 
 
+@MEET.wrong("Your lines run through a, d and through b, c. The first runs through a and b.")
+def lines_crosswise(a, b, c, d):
+    return meet(a, d, b, c)
+
+
 # 2: the focal length --------------------------------------------------------------------------------------------------
 
 

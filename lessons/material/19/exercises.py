@@ -517,4 +517,10 @@ def ratio_of_sizes(points, true):
     return _moved(points, true, scale=lambda a, b: np.linalg.norm(b) / np.linalg.norm(a))
 
 
+@ALIGNED.wrong("You did not turn the points. The clouds may be turned against each other, too.")
+def without_rotation(points, true):
+    a, b = points - points.mean(axis=0), true - true.mean(axis=0)
+    return np.sum(a * b) / np.sum(a * a) * a + true.mean(axis=0)
+
+
 EXERCISES = (CARRY, HOMOGRAPHY, STEP, DRAWS, RESIDUALS, ALIGNED)
