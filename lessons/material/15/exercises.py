@@ -5,7 +5,7 @@ Noise figures are standard deviations in electrons, frames are in digital number
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -244,13 +244,9 @@ def multiplied(frame, dark, flat):
 
 def merge(electrons: Array, exposures: Array, dark_noise: float, full_well: float) -> Array:
     """Electrons per second (...) from frames (n, ...), weights t² / (σ² + x t); NaN where every frame is full."""
-    return _merged(electrons, exposures, full_well, lambda x, t: t**2 / (dark_noise**2 + x * t))
-
-
-def _merged(electrons: Array, exposures: Array, full_well: float, weight: Callable[[Array, Array], Array]) -> Array:
-    """The mean of the frames, each pixel that is not full with weight(x, t): x its light, t the frame's time."""
     t, usable = _times(electrons, exposures), electrons < full_well
-    return _weighed(usable * weight(_light(electrons, t, usable), t), electrons / t)
+    x = _light(electrons, t, usable)
+    return _weighed(usable * t**2 / (dark_noise**2 + x * t), electrons / t)
 
 
 def _times(electrons: Array, exposures: Array) -> Array:
@@ -347,9 +343,11 @@ def electrons_averaged(electrons, exposures, dark_noise, full_well):
     return _weighed(usable * t**2 / (dark_noise**2 + _light(electrons, t, usable) * t), electrons)
 
 
-@MERGE.wrong("You weigh by the variance: the noisiest count most. Take its inverse.")
-def weighed_by_the_variance(electrons, exposures, dark_noise, full_well):
-    return _merged(electrons, exposures, full_well, lambda x, t: (dark_noise**2 + x * t) / t**2)
+@MERGE.wrong("You drop a whole frame as soon as one pixel of it is full. Decide for each pixel by itself.")
+def whole_frames_dropped(electrons, exposures, dark_noise, full_well):
+    t = _times(electrons, exposures)
+    good = (electrons < full_well).all(axis=tuple(range(1, electrons.ndim)), keepdims=True) & (electrons >= 0)
+    return _weighed(good * t**2 / (dark_noise**2 + _light(electrons, t, good) * t), electrons / t)
 
 
 # 5: what rows and columns share ---------------------------------------------------------------------------------------

@@ -550,9 +550,9 @@ def veiled_again(recorded, glare):
     return (1 - glare) * recorded + glare * np.mean(recorded, axis=(0, 1))
 
 
-@VEIL.wrong("You subtract the darkest value. That is the veil only where the scene has a black.")
-def darkest_value_off(recorded, glare):
-    return (recorded - np.min(recorded, axis=(0, 1))) / (1 - glare)
+@VEIL.wrong("You multiply by 1 − glare. The light was multiplied by it: divide.")
+def multiplied_by_what_is_left(recorded, glare):
+    return (recorded - glare * np.mean(recorded, axis=(0, 1))) * (1 - glare)
 
 
 # 9: what an ISO number promises --------------------------------------------------------------------------------------
