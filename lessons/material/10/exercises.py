@@ -67,98 +67,24 @@ def as_opencv_projects_it(points, xi):
     return np.where(seen[..., None], np.reshape(xy, (*points.shape[:-1], 2)), np.nan)
 
 
-@PROJECT.right
-def onto_the_unit_sphere_first(points, xi):
-    x, y, z = np.moveaxis(points / np.linalg.norm(points, axis=-1, keepdims=True), -1, 0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where((z > -xi)[..., None], np.stack([x / (z + xi), y / (z + xi)], axis=-1), np.nan)
-
-
-@PROJECT.right
-def in_the_alpha_form(points, xi):
-    alpha = xi / (1 + xi)
-    depth = alpha * np.linalg.norm(points, axis=-1, keepdims=True) + (1 - alpha) * points[..., 2:]
-    return (1 - alpha) * points[..., :2] / np.where(depth > 0, depth, np.nan)
-
-
-@PROJECT.right
-def point_by_point(points, xi):
-    xy = np.full((points.size // 3, 2), np.nan)
-    for i, (X, Y, Z) in enumerate(points.reshape(-1, 3)):
-        depth = Z + xi * (X**2 + Y**2 + Z**2) ** 0.5
-        if depth > 0:
-            xy[i] = X / depth, Y / depth
-    return xy.reshape(*points.shape[:-1], 2)
-
-
 @PROJECT.wrong("This is the pinhole, ξ = 0: nothing beside the camera or behind it has an image.")
 def pinhole(points, xi):
     return points[..., :2] / np.where(points[..., 2:] > 0, points[..., 2:], np.nan)
 
 
-@PROJECT.wrong(
-    "For points that have an image this is right. Where Z + ξ D ≤ 0 there is none, and the formula gives the mirror "
-    "image of a point behind: say NaN there."
-)
+@PROJECT.wrong("Where Z + ξ D ≤ 0 there is no image: return NaN. Your formula mirrors these points through the middle.")
 def mirror_images_kept(points, xi):
     return points[..., :2] / (points[..., 2:] + xi * np.linalg.norm(points, axis=-1, keepdims=True))
 
 
-@PROJECT.wrong(
-    "Where Z + ξ D is *exactly* 0 you divide by it, and the image is infinitely far away. The task asks for NaN there "
-    "too: only what is above 0 has an image."
-)
-def infinity_at_zero(points, xi):
-    depth = points[..., 2:] + xi * np.linalg.norm(points, axis=-1, keepdims=True)
-    return points[..., :2] / np.where(depth < 0, np.nan, depth)
-
-
-@PROJECT.wrong("You drop everything behind the camera, as a pinhole must. The sphere shows what has Z + ξ D > 0.")
+@PROJECT.wrong("You drop all points behind the camera, as a pinhole does. The sphere shows those with Z + ξ D > 0.")
 def dropped_behind_the_camera(points, xi):
     return np.where(points[..., 2:] > 0, project(points, xi), np.nan)
-
-
-@PROJECT.wrong(
-    "You asked for |Z + ξ D| > 0, or divided by its size: points behind get an image that way. Ask its sign."
-)
-def divided_by_the_size(points, xi):
-    depth = points[..., 2:] + xi * np.linalg.norm(points, axis=-1, keepdims=True)
-    return points[..., :2] / np.abs(depth)
-
-
-@PROJECT.wrong("For points that have an image this is right. The others have *none*: the answer is NaN, not (0, 0).")
-def zero_for_no_image(points, xi):
-    return np.nan_to_num(project(points, xi))
-
-
-@PROJECT.wrong(
-    "Yours is (1 + ξ) times too large: it agrees with a pinhole in the middle. Leave that factor to the focal length."
-)
-def scaled_to_the_pinhole(points, xi):
-    return project(points, xi) * (1 + xi)
 
 
 @PROJECT.wrong("You add ξ instead of ξ D: that is right only for points on the unit sphere, one metre away.")
 def xi_without_d(points, xi):
     depth = points[..., 2:] + xi
-    return points[..., :2] / np.where(depth > 0, depth, np.nan)
-
-
-@PROJECT.wrong("You add ξ D². The distance is the *square root* of X² + Y² + Z².")
-def d_squared(points, xi):
-    depth = points[..., 2:] + xi * np.sum(points**2, axis=-1, keepdims=True)
-    return points[..., :2] / np.where(depth > 0, depth, np.nan)
-
-
-@PROJECT.wrong("Your D is the distance from the *axis*, without Z. It is the distance from the viewpoint: all three.")
-def distance_from_the_axis(points, xi):
-    depth = points[..., 2:] + xi * np.linalg.norm(points[..., :2], axis=-1, keepdims=True)
-    return points[..., :2] / np.where(depth > 0, depth, np.nan)
-
-
-@PROJECT.wrong("ξ stands before Z in yours. It belongs to D, the distance: with ξ = 0 the pinhole's Z must remain.")
-def xi_before_z(points, xi):
-    depth = xi * points[..., 2:] + np.linalg.norm(points, axis=-1, keepdims=True)
     return points[..., :2] / np.where(depth > 0, depth, np.nan)
 
 
@@ -172,11 +98,6 @@ def eye_in_front(points, xi):
 def one_distance_for_all(points, xi):
     depth = points[..., 2:] + xi * np.linalg.norm(points)
     return points[..., :2] / np.where(depth > 0, depth, np.nan)
-
-
-@PROJECT.wrong("This is the point on the unit sphere, (X, Y)/D. The second step is missing: see it from ξ behind.")
-def on_the_sphere_only(points, xi):
-    return points[..., :2] / np.linalg.norm(points, axis=-1, keepdims=True)
 
 
 # 3: and back ---------------------------------------------------------------------------------------------------------
@@ -231,23 +152,12 @@ def by_the_roots_of_the_quadratic(xy, xi):
     return np.reshape(rays, (*xy.shape[:-1], 3))
 
 
-@UNPROJECT.right
-def with_the_line_as_a_vector(xy, xi):
-    along = np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1)
-    a = np.sum(along**2, axis=-1, keepdims=True)
-    eta = xi / a + np.sqrt((xi / a) ** 2 - (xi**2 - 1) / a)
-    return eta * along - np.array([0, 0, xi])
-
-
-@UNPROJECT.wrong(
-    "This is the pinhole's ray, (x, y, 1) made a unit vector. That is where the line from ξ behind goes, not where it "
-    "meets the sphere."
-)
+@UNPROJECT.wrong("You made (x, y, 1) a unit vector. Find where the line from the point ξ behind meets the sphere.")
 def ray_of_a_pinhole(xy, xi):
     return unproject(xy, 0.0)
 
 
-@UNPROJECT.wrong("You forgot to subtract ξ: your vector starts at the point ξ behind, not at the centre of the sphere.")
+@UNPROJECT.wrong("You forgot to subtract ξ: your vector starts at the point ξ behind, not at the sphere's centre.")
 def seen_from_the_eye(xy, xi):
     return unproject(xy, xi) + np.array([0, 0, xi])
 
@@ -259,72 +169,10 @@ def smaller_root(xy, xi):
     return np.stack([eta * xy[..., 0], eta * xy[..., 1], eta - xi], axis=-1)
 
 
-@UNPROJECT.wrong(
-    "You scaled (x, y, 1 − ξ) to unit length. That moves it along a line through the *centre*; the line of sight goes "
-    "through the point ξ behind it."
-)
-def scaled_about_the_centre(xy, xi):
-    point = np.concatenate([xy, np.full_like(xy[..., :1], 1 - xi)], axis=-1)
-    return point / np.linalg.norm(point, axis=-1, keepdims=True)
-
-
-@UNPROJECT.wrong(
-    "You went one unit along the line from the point ξ behind. The *sphere* has radius 1 about the centre: solve for "
-    "the η that ends on it."
-)
-def one_unit_along_the_line(xy, xi):
-    return unproject(xy, 0.0) - np.array([0, 0, xi])
-
-
-def _with_root_of(xy, xi, inside):
-    r2 = np.sum(xy**2, axis=-1)
-    eta = (xi + np.sqrt(inside(r2))) / (1 + r2)
-    return np.stack([eta * xy[..., 0], eta * xy[..., 1], eta - xi], axis=-1)
-
-
-@UNPROJECT.wrong("A sign under the root has slipped: multiplying out gives 1 + (1 − ξ²) r², yours has 1 + (1 + ξ²) r².")
-def sign_under_the_root(xy, xi):
-    return _with_root_of(xy, xi, lambda r2: 1 + (1 + xi**2) * r2)
-
-
-@UNPROJECT.wrong("Under the root ξ must be squared: 1 + (1 − *ξ²*) r². It comes from ξ² = 1 on the sphere's equation.")
-def xi_not_squared(xy, xi):
-    return _with_root_of(xy, xi, lambda r2: 1 + abs(1 - xi) * r2)
-
-
-@UNPROJECT.wrong("The root is missing its r²: you have 1 + (1 − ξ²) under it, the same for every pixel.")
-def root_without_r(xy, xi):
-    return _with_root_of(xy, xi, lambda r2: np.abs(2 - xi**2) + 0 * r2)
-
-
-@UNPROJECT.wrong("You divide nowhere by 1 + r². It is the factor of η² in the quadratic equation.")
-def not_divided(xy, xi):
-    r2 = np.sum(xy**2, axis=-1)
-    eta = xi + np.sqrt(1 + (1 - xi**2) * r2)
-    return np.stack([eta * xy[..., 0], eta * xy[..., 1], eta - xi], axis=-1)
-
-
-@UNPROJECT.wrong("Your r² is r, the distance itself: a root was taken too early.")
-def r_for_its_square(xy, xi):
-    r = np.linalg.norm(xy, axis=-1)
-    eta = (xi + np.sqrt(np.abs(1 + (1 - xi**2) * r))) / (1 + r)
-    return np.stack([eta * xy[..., 0], eta * xy[..., 1], eta - xi], axis=-1)
-
-
-@UNPROJECT.wrong(
-    "You found Z from the length, sqrt(1 − X² − Y²), which is never negative. Rays that look backwards have Z < 0: use "
-    "Z = η − ξ."
-)
+@UNPROJECT.wrong("Your Z is never negative. Rays that look backwards have Z < 0: use Z = η − ξ.")
 def never_backwards(xy, xi):
     rays = unproject(xy, xi)
     return np.concatenate([rays[..., :2], np.abs(rays[..., 2:])], axis=-1)
-
-
-@UNPROJECT.wrong("Your r² is the sum over *all* image points. Each has its own: sum over the last axis only.")
-def one_radius_for_all(xy, xi):
-    r2 = np.sum(xy**2)
-    eta = (xi + np.sqrt(np.maximum(1 + (1 - xi**2) * r2, 0))) / (1 + r2)
-    return np.stack([eta * xy[..., 0], eta * xy[..., 1], 0 * xy[..., 0] + eta - xi], axis=-1)
 
 
 # 4: find the bug in the double sphere --------------------------------------------------------------------------------
@@ -376,23 +224,6 @@ def sphere_after_sphere(points, xi, alpha):
     return second[..., :2] / second[..., 2:] / (1 - alpha)
 
 
-@DOUBLE_SPHERE.right
-def by_moving_the_points(points, xi, alpha):
-    moved = points + [0, 0, xi] * np.linalg.norm(points, axis=-1, keepdims=True)
-    depth = alpha * np.sqrt(np.einsum("...i,...i", moved, moved)) + (1 - alpha) * moved[..., 2]
-    return np.stack([points[..., 0] / depth, points[..., 1] / depth], axis=-1)
-
-
-@DOUBLE_SPHERE.right
-def one_point_after_the_other(points, xi, alpha):
-    xy = []
-    for X, Y, Z in points.reshape(-1, 3):
-        moved = xi * (X * X + Y * Y + Z * Z) ** 0.5 + Z
-        denominator = alpha * (X * X + Y * Y + moved * moved) ** 0.5 + (1 - alpha) * moved
-        xy.append((X / denominator, Y / denominator))
-    return np.reshape(xy, (*points.shape[:-1], 2))
-
-
 def _double(points, alpha, d2, z):
     return points[..., :2] / (alpha * d2 + (1 - alpha) * z)[..., None]
 
@@ -404,7 +235,7 @@ def _parts(points, xi):
     return d1, beside, z, np.hypot(beside, z)
 
 
-@DOUBLE_SPHERE.wrong("D₂ is right now; the other term still has Z where the moved depth ξ D₁ + Z belongs.")
+@DOUBLE_SPHERE.wrong("D₂ is right now. The other term still has Z: it needs the moved depth ξ D₁ + Z.")
 def unmoved_depth(points, xi, alpha):
     return _double(points, alpha, _parts(points, xi)[3], points[..., 2])
 
@@ -425,47 +256,6 @@ def moved_by_xi(points, xi, alpha):
 def without_the_third_coordinate(points, xi, alpha):
     _, beside, z, _ = _parts(points, xi)
     return _double(points, alpha, beside, z)
-
-
-@DOUBLE_SPHERE.wrong("You moved the point the other way: the depth is ξ D₁ *plus* Z.")
-def moved_the_other_way(points, xi, alpha):
-    return double_sphere(points, -xi, alpha)
-
-
-@DOUBLE_SPHERE.wrong("Your D₂ is a sum of squares: its root is missing.")
-def root_missing(points, xi, alpha):
-    _, _, z, d2 = _parts(points, xi)
-    return _double(points, alpha, d2**2, z)
-
-
-@DOUBLE_SPHERE.wrong(
-    "You added ξ D₁ to the distance. A point moved by ξ D₁ along z is that much farther only if it is on the axis."
-)
-def distances_added(points, xi, alpha):
-    d1, _, z, _ = _parts(points, xi)
-    return _double(points, alpha, d1 + xi * d1, z)
-
-
-@DOUBLE_SPHERE.wrong("D₂ is right now, but the factor 1 − α has gone from the other term.")
-def without_one_minus_alpha(points, xi, alpha):
-    _, _, z, d2 = _parts(points, xi)
-    return points[..., :2] / (alpha * d2 + z)[..., None]
-
-
-@DOUBLE_SPHERE.wrong("This is Mei's form, with α/(1 − α) before D₂. Here the focal length is that of the α form.")
-def in_mei_s_form(points, xi, alpha):
-    return double_sphere(points, xi, alpha) * (1 - alpha)
-
-
-@DOUBLE_SPHERE.wrong("Z is counted twice in your D₂: `z` holds it already.")
-def z_counted_twice(points, xi, alpha):
-    _, beside, z, _ = _parts(points, xi)
-    return _double(points, alpha, np.hypot(beside, z + points[..., 2]), z)
-
-
-@DOUBLE_SPHERE.wrong("Now D₁ and Z stand everywhere, and ξ does nothing: that is the unified sphere, with one sphere.")
-def one_sphere_only(points, xi, alpha):
-    return double_sphere(points, 0.0, alpha)
 
 
 # 7: onto the cube ----------------------------------------------------------------------------------------------------
@@ -512,35 +302,9 @@ def through_the_nearest_of_three_slabs(direction):
     return along * direction
 
 
-@CUBE.right
-def with_the_place_of_the_largest(direction):
-    place = np.argmax(np.abs(direction), axis=-1)[..., None]
-    return direction / np.abs(np.take_along_axis(direction, place, axis=-1))
-
-
-@CUBE.right
-def one_direction_after_the_other(direction):
-    points = [one / max(abs(one)) for one in direction.reshape(-1, 3)]
-    return np.reshape(points, direction.shape)
-
-
-@CUBE.wrong(
-    "You divide by the largest coordinate, not by the largest in *size*: a direction to the back or the left comes out "
-    "in the wrong place."
-)
+@CUBE.wrong("You divide by the largest coordinate. Divide by the largest *size*: coordinates may be negative.")
 def largest_with_its_sign(direction):
     return direction / np.max(direction, axis=-1, keepdims=True)
-
-
-@CUBE.wrong("The sign is lost: you divide by the largest coordinate with its sign, and that makes −1 into +1.")
-def divided_by_a_signed_number(direction):
-    place = np.argmax(np.abs(direction), axis=-1)[..., None]
-    return direction / np.take_along_axis(direction, place, axis=-1)
-
-
-@CUBE.wrong("Everything has become positive: the size is for the divisor only, not for the direction.")
-def sizes_only(direction):
-    return np.abs(cube_point(direction))
 
 
 @CUBE.wrong("This point is on the *sphere*. On the cube, the largest coordinate is ±1.")
@@ -548,12 +312,7 @@ def on_the_sphere(direction):
     return direction / np.linalg.norm(direction, axis=-1, keepdims=True)
 
 
-@CUBE.wrong("Here |x| + |y| + |z| is 1: that is an octahedron. On the cube the *largest* of the three is 1.")
-def on_an_octahedron(direction):
-    return direction / np.sum(np.abs(direction), axis=-1, keepdims=True)
-
-
-@CUBE.wrong("This is right on the front and the back. To the side, up and down, another coordinate is the largest.")
+@CUBE.wrong("This is right on the front and the back. On the other faces another coordinate is the largest.")
 def front_and_back_only(direction):
     return direction / np.abs(direction[..., 2:])
 
@@ -563,36 +322,9 @@ def one_size_for_all(direction):
     return direction / np.max(np.abs(direction))
 
 
-@CUBE.wrong("Clipping bends the ray: each coordinate is cut by itself. All three must shrink by the same factor.")
+@CUBE.wrong("You clip each coordinate by itself, which bends the ray. Divide all three by the same number.")
 def clipped(direction):
     return np.clip(direction, -1, 1)
-
-
-@CUBE.wrong(
-    "These are corners of the cube: only the signs are left. The two smaller coordinates tell the place on a face."
-)
-def corners(direction):
-    return np.sign(direction)
-
-
-@CUBE.wrong("This is the middle of the right face. The other two coordinates tell the place on it: do not drop them.")
-def middle_of_the_face(direction):
-    return np.where(np.abs(cube_point(direction)) == 1, np.sign(direction), 0.0)
-
-
-@CUBE.wrong("You divide by the *smallest* size: that point lies beyond the cube, where the ray meets its last plane.")
-def smallest(direction):
-    return direction / np.min(np.abs(direction), axis=-1, keepdims=True)
-
-
-@CUBE.wrong("Your cube has side 1. Its faces are at ±1, so that its side is 2.")
-def half_as_large(direction):
-    return cube_point(direction) / 2
-
-
-@CUBE.wrong("You multiply by the largest size, which carries the point away. Dividing brings it onto the cube.")
-def multiplied(direction):
-    return direction * np.max(np.abs(direction), axis=-1, keepdims=True)
 
 
 # 2: torn at the seam -------------------------------------------------------------------------------------------------
@@ -629,67 +361,25 @@ PARALLAX = Exercise(
 
 
 @PARALLAX.right
-def as_the_angle_between_two_rays(cameras, radius, distance, width):
-    alpha = np.pi / cameras
-    thing = np.array([0.0, distance])
-    left, right = (thing - radius * np.array([side * np.sin(alpha), np.cos(alpha)]) for side in (-1, 1))
-    angle = np.arctan2(left[0] * right[1] - left[1] * right[0], left @ right)
-    return angle * width / (2 * np.pi)
-
-
-@PARALLAX.right
 def with_complex_numbers(cameras, radius, distance, width):
     return np.angle(distance - radius * np.exp(-1j * np.pi / cameras)) * width / np.pi
-
-
-@PARALLAX.right
-def in_degrees_and_back(cameras, radius, distance, width):
-    import math
-
-    alpha = math.radians(180 / cameras)
-    psi = math.degrees(math.atan(radius * math.sin(alpha) / (distance - radius * math.cos(alpha))))
-    return 2 * psi * width / 360
 
 
 def _pixels(angle, width):
     return 2 * angle * width / (2 * np.pi)
 
 
-@PARALLAX.wrong("This is how far *one* camera's image is from the seam. The other's is as far beyond it.")
-def one_camera(cameras, radius, distance, width):
-    return parallax(cameras, radius, distance, width) / 2
-
-
-@PARALLAX.wrong(
-    "You measure the distance from the cameras' line; Z counts from the ring's *centre*, so that the cameras are "
-    "r cos α nearer."
-)
+@PARALLAX.wrong("You measure Z from the cameras' line. It counts from the ring's *centre*: subtract r cos α.")
 def from_the_cameras_line(cameras, radius, distance, width):
     return _pixels(np.arctan2(radius * np.sin(np.pi / cameras), distance), width)
 
 
-@PARALLAX.wrong("You moved the cameras to the other side of the centre: they are r cos α *nearer* to the thing.")
-def behind_the_centre(cameras, radius, distance, width):
-    alpha = np.pi / cameras
-    return _pixels(np.arctan2(radius * np.sin(alpha), distance + radius * np.cos(alpha)), width)
-
-
-@PARALLAX.wrong("You took the cameras to be r nearer, as if they stood on the seam. Along it they are at r cos α.")
-def a_whole_radius_nearer(cameras, radius, distance, width):
-    return _pixels(np.arctan2(radius * np.sin(np.pi / cameras), distance - radius), width)
-
-
-@PARALLAX.wrong("b/Z is what remains far away. Near the ring it is too small: use the exact angle.")
+@PARALLAX.wrong("b/Z holds far away. Near the ring it is too small: use the exact angle.")
 def baseline_over_distance(cameras, radius, distance, width):
     return 2 * radius * np.sin(np.pi / cameras) / distance * width / (2 * np.pi)
 
 
-@PARALLAX.wrong("You take the ring's diameter for the baseline. Neighbours are 2 r sin(π/n) apart.")
-def diameter_for_baseline(cameras, radius, distance, width):
-    return 2 * radius / distance * width / (2 * np.pi)
-
-
-@PARALLAX.wrong("You take the *tangent* for the angle. Near the ring they differ: np.arctan2 turns one into the other.")
+@PARALLAX.wrong("You take the *tangent* for the angle. Near the ring they differ: use np.arctan2.")
 def tangent_for_angle(cameras, radius, distance, width):
     alpha = np.pi / cameras
     return _pixels(radius * np.sin(alpha) / (distance - radius * np.cos(alpha)), width)
@@ -701,31 +391,9 @@ def whole_angle_between_cameras(cameras, radius, distance, width):
     return _pixels(np.arctan2(radius * np.sin(alpha), distance - radius * np.cos(alpha)), width)
 
 
-@PARALLAX.wrong("α is in degrees in yours, 180/n. np.sin and np.cos take radians: π/n.")
-def alpha_in_degrees(cameras, radius, distance, width):
-    alpha = 180 / cameras
-    return _pixels(np.arctan2(radius * np.sin(alpha), distance - radius * np.cos(alpha)), width)
-
-
-@PARALLAX.wrong("sin and cos have changed places: beside the seam a camera stands r *sin* α, along it r *cos* α.")
-def sine_and_cosine_swapped(cameras, radius, distance, width):
-    alpha = np.pi / cameras
-    return _pixels(np.arctan2(radius * np.cos(alpha), distance - radius * np.sin(alpha)), width)
-
-
 @PARALLAX.wrong("This is the angle in radians. Multiply by the pixels per radian, width/(2π).")
 def still_in_radians(cameras, radius, distance, width):
     return parallax(cameras, radius, distance, width) * 2 * np.pi / width
-
-
-@PARALLAX.wrong("A panorama has width/(2π) pixels per radian, not width: it goes all the way round.")
-def width_per_radian(cameras, radius, distance, width):
-    return parallax(cameras, radius, distance, width) * 2 * np.pi
-
-
-@PARALLAX.wrong("Your angle is in radians, but you took width/360 pixels: that is per *degree*.")
-def radians_as_degrees(cameras, radius, distance, width):
-    return parallax(cameras, radius, distance, width) * 2 * np.pi / 360
 
 
 # 5: two cameras of one valley -----------------------------------------------------------------------------------------
@@ -766,25 +434,6 @@ APART = Exercise(
 
 
 @APART.right
-def from_points_in_space(theta, f, xi, other):
-    X, Z = np.sin(theta), np.cos(theta)
-    D = np.hypot(X, Z)
-    middle = f / (1 + xi)
-    return middle * (1 + other) * X / (Z + other * D) - middle * (1 + xi) * X / (Z + xi * D)
-
-
-@APART.right
-def with_two_loops(theta, f, xi, other):
-    import math
-
-    found = [
-        f * (1 + other) / (1 + xi) * math.sin(one) / (math.cos(one) + other) - f * math.sin(one) / (math.cos(one) + xi)
-        for one in np.ravel(theta)
-    ]
-    return np.reshape(found, np.shape(theta))
-
-
-@APART.right
 def over_one_denominator(theta, f, xi, other):
     c = np.cos(theta)
     return f * np.sin(theta) / (1 + xi) * (other - xi) * (c - 1) / ((c + other) * (c + xi))
@@ -795,49 +444,19 @@ def with_the_same_f(theta, f, xi, other):
     return _radius(theta, f, other) - _radius(theta, f, xi)
 
 
-@APART.wrong("The quotient is upside down: the greater ξ needs the greater f, by (1 + other)/(1 + ξ).")
-def quotient_upside_down(theta, f, xi, other):
-    return _radius(theta, f * (1 + xi) / (1 + other), other) - _radius(theta, f, xi)
-
-
-@APART.wrong("You kept f/ξ. What the middle shows is f/(1 + ξ).")
+@APART.wrong("You kept f/ξ. The middle of the picture depends on f/(1 + ξ).")
 def kept_f_over_xi(theta, f, xi, other):
     return _radius(theta, f * other / max(xi, 1e-3), other) - _radius(theta, f, xi)
 
 
-@APART.wrong("The sign is turned round: the task asks for the second radius minus the first.")
-def first_minus_second(theta, f, xi, other):
-    return -apart(theta, f, xi, other)
-
-
-@APART.wrong("This is the size alone. Where the second radius is the smaller one, the answer is negative.")
+@APART.wrong("This is the size alone. Where the second radius is smaller, the answer is negative.")
 def size_alone(theta, f, xi, other):
     return np.abs(apart(theta, f, xi, other))
 
 
-@APART.wrong("You used tan θ, the pinhole's radius, in place of sin θ / (cos θ + ξ).")
-def as_of_pinholes(theta, f, xi, other):
-    return (f * (1 + other) / (1 + xi) - f) * np.tan(theta)
-
-
-@APART.wrong("sin and cos have changed places: X = sin θ is beside the axis, Z = cos θ along it.")
-def sine_and_cosine_in_each_other_s_place(theta, f, xi, other):
-    return apart(np.pi / 2 - theta, f, xi, other)
-
-
-@APART.wrong("θ is given in radians; you turned it into degrees or back.")
-def angles_converted(theta, f, xi, other):
-    return apart(np.radians(theta), f, xi, other)
-
-
-@APART.wrong("This is where the second camera draws the ray. From it the first camera's radius must be subtracted.")
-def second_radius_alone(theta, f, xi, other):
-    return _radius(theta, f * (1 + other) / (1 + xi), other)
-
-
-@APART.wrong("The second radius has the first camera's ξ below the line: both numbers change together.")
-def first_xi_below_the_line(theta, f, xi, other):
-    return _radius(theta, f * (1 + other) / (1 + xi), xi) - _radius(theta, f, xi)
+@APART.wrong("The quotient is upside down: the greater ξ needs the greater f, by (1 + other)/(1 + ξ).")
+def quotient_upside_down(theta, f, xi, other):
+    return _radius(theta, f * (1 + xi) / (1 + other), other) - _radius(theta, f, xi)
 
 
 # 6: one polynomial for any mirror -------------------------------------------------------------------------------------
@@ -884,12 +503,6 @@ def by_the_normal_equations(rho, theta):
 
 
 @POLYNOMIAL.right
-def by_the_pseudoinverse(rho, theta):
-    A = np.vander(rho, 5, increasing=True)[:, [0, 2, 3, 4]]
-    return (np.linalg.pinv(A) @ (rho / np.tan(theta))).tolist()
-
-
-@POLYNOMIAL.right
 def by_a_general_solver(rho, theta):
     from scipy.optimize import least_squares
 
@@ -902,21 +515,6 @@ def by_a_general_solver(rho, theta):
 @POLYNOMIAL.wrong("You fit ρ tan θ. From tan θ = ρ/z follows z = ρ / tan θ.")
 def times_the_tangent(rho, theta):
     return _fitted(rho, rho * np.tan(theta))
-
-
-@POLYNOMIAL.wrong("You fit tan θ itself. The polynomial gives z, which is ρ / tan θ.")
-def the_tangent_itself(rho, theta):
-    return _fitted(rho, np.tan(theta))
-
-
-@POLYNOMIAL.wrong("You fit θ. The polynomial gives how far forward the ray goes, z = ρ / tan θ.")
-def the_angle_itself(rho, theta):
-    return _fitted(rho, theta)
-
-
-@POLYNOMIAL.wrong("You fit the cosine: that is z of a ray of length 1. This ray is (ρ, z), so that z = ρ / tan θ.")
-def the_cosine(rho, theta):
-    return _fitted(rho, np.cos(theta))
 
 
 @POLYNOMIAL.wrong("Your polynomial has ρ as well, with a1. In this model a1 is 0: the mirror's top has no kink.")
@@ -935,28 +533,7 @@ def even_powers_only(rho, theta):
     return np.array([a0, a2, 0.0, a4])
 
 
-@POLYNOMIAL.wrong("The order is a0 a2 a3 a4, from the lowest power to the highest.")
-def highest_power_first(rho, theta):
-    return polynomial(rho, theta)[::-1]
-
-
-@POLYNOMIAL.wrong("You use the first four rays alone. All of them count: take the least squares of all n equations.")
-def through_the_first_four_rays(rho, theta):
-    return np.linalg.solve(rho[:4, None] ** np.array([0, 2, 3, 4]), (rho / np.tan(theta))[:4])
-
-
-@POLYNOMIAL.wrong("You find each number as though the others were zero. They share the work: solve for all at once.")
-def one_number_after_the_other(rho, theta):
-    A = rho[:, None] ** np.array([0, 2, 3, 4])
-    return A.T @ (rho / np.tan(theta)) / np.sum(A**2, axis=0)
-
-
-@POLYNOMIAL.wrong("The sign is turned round: z is positive for rays in front, where θ is below 90°.")
-def backward_z(rho, theta):
-    return -polynomial(rho, theta)
-
-
-@POLYNOMIAL.wrong("You fit a polynomial of θ. It is one of ρ: the way goes from the pixel to the ray.")
+@POLYNOMIAL.wrong("You fit a polynomial of θ. The model is a polynomial of ρ: it goes from the pixel to the ray.")
 def of_the_angle(rho, theta):
     return _fitted(theta, rho / np.tan(theta))
 

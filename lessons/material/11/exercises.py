@@ -51,46 +51,14 @@ def by_four_axes(sensor, n, v, u):
     return sensor.reshape(height // n, n, width // n, n)[:, v, :, u]
 
 
-@SUB_APERTURE.right
-def by_lists_of_rows_and_columns(sensor, n, v, u):
-    return sensor[np.ix_(range(v, sensor.shape[0], n), range(u, sensor.shape[1], n))]
-
-
-@SUB_APERTURE.right
-def microlens_by_microlens(sensor, n, v, u):
-    view = np.zeros((sensor.shape[0] // n, sensor.shape[1] // n))
-    for y, x in np.ndindex(view.shape):
-        view[y, x] = sensor[n * y + v, n * x + u]
-    return view
-
-
 @SUB_APERTURE.wrong("v and u have changed places: v counts downwards, so it goes with the rows, the first index.")
 def v_and_u_swapped(sensor, n, v, u):
     return sensor[u::n, v::n]
 
 
-@SUB_APERTURE.wrong(
-    "This is what lies under *one* microlens: one point, from everywhere. A view takes one pixel from each."
-)
-def under_one_microlens(sensor, n, v, u):
-    return sensor[v * n : (v + 1) * n, u * n : (u + 1) * n]
-
-
-@SUB_APERTURE.wrong(
-    "This cuts the sensor into n × n tiles. The views do not lie beside each other, they are interleaved."
-)
+@SUB_APERTURE.wrong("You cut the sensor into n × n tiles. The views are interleaved, not side by side.")
 def tiles(sensor, n, v, u):
     return np.split(np.split(sensor, n, 0)[v], n, 1)[u]
-
-
-@SUB_APERTURE.wrong("This is the view at the top left, whatever is asked for: begin at row v and column u.")
-def always_the_first_view(sensor, n, v, u):
-    return sensor[::n, ::n]
-
-
-@SUB_APERTURE.wrong("You begin one pixel too early: v and u count from 0, as the rows and columns of an array do.")
-def counted_from_one(sensor, n, v, u):
-    return sensor[(v - 1) % n :: n, (u - 1) % n :: n]
 
 
 @SUB_APERTURE.wrong("You count v and u from the middle pixel under a microlens. They count from its top left.")
@@ -98,34 +66,10 @@ def counted_from_the_middle(sensor, n, v, u):
     return sensor[(v + n // 2) % n :: n, (u + n // 2) % n :: n]
 
 
-@SUB_APERTURE.wrong(
-    "You count from the bottom right. The sensor's picture has been turned already: (0, 0) is top left."
-)
-def turned_by_half_a_turn(sensor, n, v, u):
-    return sensor[n - 1 - v :: n, n - 1 - u :: n]
-
-
-@SUB_APERTURE.wrong("`v:n` ends at n. A *step* of n has two colons before it.")
-def stop_for_step(sensor, n, v, u):
-    return sensor[v:n, u:n]
-
-
-@SUB_APERTURE.wrong("The rows are right. The columns need the same step, beginning at u.")
-def rows_only(sensor, n, v, u):
-    return sensor[v::n]
-
-
-@SUB_APERTURE.wrong(
-    "This is the mean of all pixels under each microlens: an ordinary photograph. A view takes one of them."
-)
+@SUB_APERTURE.wrong("You average all pixels under each microlens, as a photograph does. A view takes one of them.")
 def all_directions_together(sensor, n, v, u):
     height, width = sensor.shape
     return sensor.reshape(height // n, n, width // n, n).mean(axis=(1, 3))
-
-
-@SUB_APERTURE.wrong("The pixels are the right ones, but rows and columns of the view have changed places.")
-def transposed(sensor, n, v, u):
-    return sensor[v::n, u::n].T
 
 
 # 2: slope from depth -------------------------------------------------------------------------------------------------
@@ -175,72 +119,24 @@ def by_projecting_into_two_views(z, b, f, z_f):
     return columns[0] - columns[1]
 
 
-@DISPARITY.right
-def as_a_difference_of_two_shifts(z, b, f, z_f):
-    shift = np.vectorize(lambda distance: b * f / distance)
-    return shift(z) - shift(z_f)
-
-
-@DISPARITY.wrong("This is the disparity of two parallel cameras. Here points at z_f stand still: take away b f / z_f.")
+@DISPARITY.wrong("This is the disparity of two parallel cameras. Here points at z_f stand still: subtract b f / z_f.")
 def parallel_cameras(z, b, f, z_f):
     return b * f / np.asarray(z)
 
 
-@DISPARITY.wrong("Depths do not subtract, their inverses do: 1/z − 1/z_f, not 1/(z − z_f).")
+@DISPARITY.wrong("You take 1/(z − z_f). The difference of the inverses is wanted: 1/z − 1/z_f.")
 def inverse_of_the_difference(z, b, f, z_f):
     return b * f / (np.asarray(z) - z_f)
 
 
-@DISPARITY.wrong("You subtract the depths themselves. A shift goes with 1/z: subtract the inverses.")
-def difference_of_depths(z, b, f, z_f):
-    return b * f * (z_f - np.asarray(z))
-
-
-@DISPARITY.wrong("The sign is flipped: what is nearer than z_f has a positive disparity here, as in stereo.")
-def sign_flipped(z, b, f, z_f):
-    return b * f * (1 / z_f - 1 / np.asarray(z))
-
-
-@DISPARITY.wrong("Farther things move too, but to the other side: the sign must stay. You took it away.")
+@DISPARITY.wrong("You removed the sign. Points beyond z_f move to the other side: their disparity is negative.")
 def always_positive(z, b, f, z_f):
     return np.abs(disparity(z, b, f, z_f))
-
-
-@DISPARITY.wrong("What is farther than z_f moves as well, with a negative sign. You set it to zero.")
-def zero_beyond_the_focus(z, b, f, z_f):
-    return np.maximum(disparity(z, b, f, z_f), 0)
-
-
-@DISPARITY.wrong("The focal length is left out: f turns the tangent of an angle into pixels.")
-def without_f(z, b, f, z_f):
-    return b * (1 / np.asarray(z) - 1 / z_f)
-
-
-@DISPARITY.wrong("The distance between the views is left out: twice as far apart, a point moves twice as much.")
-def without_b(z, b, f, z_f):
-    return f * (1 / np.asarray(z) - 1 / z_f)
 
 
 @DISPARITY.wrong("Brackets are missing: b f multiplies 1/z_f as well.")
 def brackets_missing(z, b, f, z_f):
     return b * f / np.asarray(z) - 1 / z_f
-
-
-@DISPARITY.wrong("You add the two inverses. At z_f the disparity must be zero: subtract.")
-def inverses_added(z, b, f, z_f):
-    return b * f * (1 / np.asarray(z) + 1 / z_f)
-
-
-@DISPARITY.wrong(
-    "This is how much larger 1/z is than 1/z_f, as a ratio. Wanted is the difference, in pixels: b f (1/z − 1/z_f)."
-)
-def relative_to_the_focus(z, b, f, z_f):
-    return z_f / np.asarray(z) - 1
-
-
-@DISPARITY.wrong("Close: you rounded to whole pixels. A slope may be any number, and depth needs its fractions.")
-def rounded_to_pixels(z, b, f, z_f):
-    return np.round(disparity(z, b, f, z_f))
 
 
 # 3: find the bug in shift and sum ------------------------------------------------------------------------------------
@@ -293,95 +189,26 @@ def as_a_slice_of_the_spectrum(views, d):
     return fourier_slice(views, d)
 
 
-@REFOCUSED.right
-def by_looking_each_pixel_up(views, d):
-    rows, columns, height, width = views.shape
-    y, x = np.arange(height)[:, None], np.arange(width)
-    steps = [(v, u) for v in range(rows) for u in range(columns)]
-    return sum(
-        views[v, u, (y - d * (v - rows // 2)) % height, (x - d * (u - columns // 2)) % width] for v, u in steps
-    ) / len(steps)
-
-
-@REFOCUSED.right
-def with_np_mean(views, d):
-    down, right = (np.arange(count) - (count - 1) // 2 for count in views.shape[:2])
-    moved = [
-        np.roll(np.roll(views[v, u], d * down[v], axis=0), d * right[u], axis=1) for v, u in np.ndindex(views.shape[:2])
-    ]
-    return np.mean(moved, axis=0)
-
-
-@REFOCUSED.wrong(
-    "The direction is reversed: this focuses nearer where it should focus farther. A point moves to the left by d, so "
-    "its view has to be moved to the right."
-)
+@REFOCUSED.wrong("The direction is reversed. A point moves to the left by d: move its view to the right.")
 def direction_reversed(views, d):
     return refocused(views, -d)
 
 
-@REFOCUSED.wrong("Now the *last* view holds still, and the picture slides the other way. Count from the middle.")
+@REFOCUSED.wrong("Now the *last* view stays still, and the picture moves the other way. Count from the middle.")
 def counted_from_the_last_view(views, d):
     rows, columns = views.shape[:2]
     return _rolled(views, lambda v, u: (d * (v - rows + 1), d * (u - columns + 1)))
 
 
-@REFOCUSED.wrong("v and u have changed places: v moves rows, axis 0, and u columns, axis 1.")
-def v_and_u_swapped_in_the_shift(views, d):
-    rows, columns = views.shape[:2]
-    return _rolled(views, lambda v, u: (d * (u - columns // 2), d * (v - rows // 2)))
-
-
-@REFOCUSED.wrong(
-    "The rows are counted from the middle now. The columns still begin at the edge: the picture slides sideways."
-)
+@REFOCUSED.wrong("Rows count from the middle now. The columns still begin at the edge: the picture moves sideways.")
 def rows_centred_only(views, d):
     return _rolled(views, lambda v, u: (d * (v - views.shape[0] // 2), d * u))
-
-
-@REFOCUSED.wrong(
-    "The columns are counted from the middle now. The rows still begin at the edge: the picture slides upright."
-)
-def columns_centred_only(views, d):
-    return _rolled(views, lambda v, u: (d * v, d * (u - views.shape[1] // 2)))
-
-
-@REFOCUSED.wrong("Each direction has its own middle: `rows` goes with v, `columns` with u. Yours are exchanged.")
-def middles_exchanged(views, d):
-    rows, columns = views.shape[:2]
-    return _rolled(views, lambda v, u: (d * (v - columns // 2), d * (u - rows // 2)))
 
 
 @REFOCUSED.wrong("Brackets are missing: d multiplies the whole step from the middle, not v alone.")
 def brackets_missing_in_the_shift(views, d):
     rows, columns = views.shape[:2]
     return _rolled(views, lambda v, u: (d * v - rows // 2, d * u - columns // 2))
-
-
-@REFOCUSED.wrong("One step too far: views count from 0, so the middle of 3 views is number 1, `3 // 2`.")
-def one_step_beyond_the_middle(views, d):
-    rows, columns = views.shape[:2]
-    return _rolled(views, lambda v, u: (d * (v - rows // 2 - 1), d * (u - columns // 2 - 1)))
-
-
-@REFOCUSED.wrong("The sum is not divided by the number of views: the picture is many times too bright.")
-def sum_for_mean(views, d):
-    return refocused(views, d) * np.prod(views.shape[:2])
-
-
-@REFOCUSED.wrong("The sum is divided by the rows only. There are rows times columns views in it.")
-def divided_by_the_rows(views, d):
-    return refocused(views, d) * views.shape[1]
-
-
-@REFOCUSED.wrong("No view is moved: this is the mean of the views as they are, focused where the main lens was.")
-def nothing_moved(views, d):
-    return views.mean(axis=(0, 1))
-
-
-@REFOCUSED.wrong("This is the middle view alone. It does hold still, but nothing is blurred: all views must be summed.")
-def middle_view_alone(views, d):
-    return views[views.shape[0] // 2, views.shape[1] // 2]
 
 
 # 4: the slope of a slice ---------------------------------------------------------------------------------------------
@@ -458,88 +285,30 @@ def by_the_structure_tensor_s_eigenvector(epi):
     return directions[1, 1] / directions[0, 1]
 
 
-@SLOPE.right
-def between_neighbouring_views(epi):
-    """By central differences in the mean of two neighbouring views."""
-    L_u, L_x = np.diff(epi, axis=0), np.gradient((epi[1:] + epi[:-1]) / 2, axis=1)
-    return np.sum(L_x * L_u) / np.sum(L_x**2) if np.any(L_x) else np.nan
-
-
 def _by_derivatives(epi, formula):
     L_u, L_x = np.gradient(epi)
     with np.errstate(all="ignore"):
         return float(formula(L_u, L_x)) if L_x.any() else np.nan
 
 
-@SLOPE.wrong(
-    "You have the derivatives in the other order: `np.gradient` gives that along u, the rows, first. So your answer is "
-    "in views per pixel."
-)
+@SLOPE.wrong("You exchanged the derivatives: `np.gradient` gives that along u first. Yours is in views per pixel.")
 def derivatives_exchanged(epi):
     return _by_derivatives(epi, lambda L_u, L_x: np.sum(L_x * L_u) / np.sum(L_u**2))
 
 
-@SLOPE.wrong("The sign is flipped: for d > 0 points move to the *left* as u grows, g(x + d u).")
-def opposite_sign(epi):
-    return -slope(epi)
-
-
-@SLOPE.wrong("Right where there is something to see. In a plain slice every slope fits equally: NaN, not 0.")
-def zero_for_a_plain_slice(epi):
-    return 0.0 if np.isnan(slope(epi)) else slope(epi)
-
-
-@SLOPE.wrong("Right where there is something to see. In a plain slice every slope fits equally: NaN, not infinity.")
-def infinity_for_a_plain_slice(epi):
-    return np.inf if np.isnan(slope(epi)) else slope(epi)
-
-
-@SLOPE.wrong(
-    "You divide the mean of L_u by the mean of L_x. Rising and falling flanks cancel in a mean, and nothing but noise "
-    "is left of a spot on a plain wall. Multiply by L_x before you sum: then every flank counts."
-)
+@SLOPE.wrong("You divide mean L_u by mean L_x. Rising and falling edges cancel: multiply by L_x before you sum.")
 def ratio_of_means(epi):
     return _by_derivatives(epi, lambda L_u, L_x: np.mean(L_u) / np.mean(L_x))
 
 
-@SLOPE.wrong(
-    "You divide at every pixel. Where L_x is nearly zero the quotient is noise, and it drowns the rest: sum first."
-)
+@SLOPE.wrong("You divide at every pixel. Where L_x is nearly zero the quotient is noise: sum first.")
 def mean_of_ratios(epi):
     return _by_derivatives(epi, lambda L_u, L_x: np.mean(L_u / L_x))
 
 
-@SLOPE.wrong(
-    "You take the median of L_u / L_x. On a plain wall with one spot most quotients are noise, and so is their median. "
-    "Weight every pixel by its L_x²: that is least squares."
-)
+@SLOPE.wrong("On a plain wall most quotients L_u / L_x are noise, so is their median. Weight pixels by L_x².")
 def median_of_ratios(epi):
     return _by_derivatives(epi, lambda L_u, L_x: np.median(L_u / L_x))
-
-
-@SLOPE.wrong("This is the size of the slope. Its sign is lost: Σ L_x L_u keeps it, Σ L_u² does not.")
-def size_only(epi):
-    return _by_derivatives(epi, lambda L_u, L_x: np.sqrt(np.sum(L_u**2) / np.sum(L_x**2)))
-
-
-@SLOPE.wrong("This is a correlation, near +1 or −1 for any slope. Divide by Σ L_x² alone.")
-def correlation(epi):
-    return _by_derivatives(epi, lambda L_u, L_x: np.sum(L_x * L_u) / np.sqrt(np.sum(L_x**2) * np.sum(L_u**2)))
-
-
-@SLOPE.wrong("This is the line's angle in radians. The slope is its tangent, in pixels a view.")
-def angle(epi):
-    return np.arctan(slope(epi))
-
-
-@SLOPE.wrong("This is how far things move from the first view to the last. The slope is the step from one to the next.")
-def over_all_views(epi):
-    return slope(epi) * (len(epi) - 1)
-
-
-@SLOPE.wrong("This is only Σ L_x L_u. Divide it by Σ L_x²: a stronger texture must not give a steeper slope.")
-def not_divided(epi):
-    return _by_derivatives(epi, lambda L_u, L_x: np.sum(L_x * L_u))
 
 
 # 5: α ----------------------------------------------------------------------------------------------------------------
@@ -584,12 +353,6 @@ def by_ng_s_equation(z, f, z_f):
     return 1 / (1 - sensor * (1 / np.asarray(z) - 1 / z_f))
 
 
-@ALPHA.right
-def one_depth_after_the_other(z, f, z_f):
-    flat = [(1 / (1 / f - 1 / one)) / (1 / (1 / f - 1 / z_f)) for one in np.ravel(z)]
-    return np.reshape(flat, np.shape(z))
-
-
 def _image(z, f):
     return 1 / (1 / f - 1 / np.asarray(z))
 
@@ -604,13 +367,6 @@ def ratio_of_depths(z, f, z_f):
     return np.asarray(z) / z_f
 
 
-@ALPHA.wrong(
-    "This is z_f/z. It is above 1 for near points, as α is, but α compares image distances, *behind* the lens."
-)
-def inverse_ratio_of_depths(z, f, z_f):
-    return z_f / np.asarray(z)
-
-
 @ALPHA.wrong("You divide by the focal length. The sensor is not at f but where z_f is sharp: v(z_f).")
 def over_the_focal_length(z, f, z_f):
     return _image(z, f) / f
@@ -621,34 +377,9 @@ def image_distance(z, f, z_f):
     return _image(z, f)
 
 
-@ALPHA.wrong("This is by how many metres the film has to move. α is a ratio: divide the two distances.")
-def difference_of_image_distances(z, f, z_f):
-    return _image(z, f) - _image(z_f, f)
-
-
-@ALPHA.wrong("A sign has slipped: 1/f = 1/z + 1/v gives 1/v = 1/f *minus* 1/z.")
+@ALPHA.wrong("A sign is wrong: 1/f = 1/z + 1/v gives 1/v = 1/f *minus* 1/z.")
 def inverses_added_for_the_image(z, f, z_f):
     return (1 / f + 1 / z_f) / (1 / f + 1 / np.asarray(z))
-
-
-@ALPHA.wrong("You forgot to invert: v is 1/(1/f − 1/z). f − z is no image distance.")
-def without_inverses(z, f, z_f):
-    return (f - np.asarray(z)) / (f - z_f)
-
-
-@ALPHA.wrong("This is a ratio of magnifications, v/z. α compares the distances v alone.")
-def ratio_of_magnifications(z, f, z_f):
-    return _image(z, f) / np.asarray(z) / (_image(z_f, f) / z_f)
-
-
-@ALPHA.wrong("You set 1/α − 1 where 1 − 1/α belongs, or took α to be straight in the slope: only 1/α is.")
-def straight_in_the_slope(z, f, z_f):
-    return 1 + _image(z_f, f) * (1 / np.asarray(z) - 1 / z_f)
-
-
-@ALPHA.wrong("The focal length stands where 1/f belongs: the thin lens equation adds *inverses*.")
-def focal_length_not_inverted(z, f, z_f):
-    return (f - 1 / z_f) / (f - 1 / np.asarray(z))
 
 
 # 6: patches of a focused plenoptic camera -----------------------------------------------------------------------------
@@ -683,28 +414,9 @@ PATCHES = Exercise(
 
 
 @PATCHES.right
-def microlens_after_microlens(sensor, n, m):
-    first = (n - m) // 2
-    picture = np.zeros((sensor.shape[0] // n * m, sensor.shape[1] // n * m))
-    for y, x in np.ndindex(sensor.shape[0] // n, sensor.shape[1] // n):
-        own = sensor[y * n : (y + 1) * n, x * n : (x + 1) * n]
-        picture[y * m : (y + 1) * m, x * m : (x + 1) * m] = own[first : first + m, first : first + m]
-    return picture
-
-
-@PATCHES.right
 def by_the_rows_and_columns_that_stay(sensor, n, m):
     rows, columns = (np.flatnonzero(np.abs(np.arange(size) % n - n // 2) <= m // 2) for size in sensor.shape)
     return sensor[np.ix_(rows, columns)]
-
-
-@PATCHES.right
-def from_views(sensor, n, m):
-    first = (n - m) // 2
-    picture = np.zeros((sensor.shape[0] // n * m, sensor.shape[1] // n * m))
-    for v, u in np.ndindex(m, m):
-        picture[v::m, u::m] = sensor[first + v :: n, first + u :: n]
-    return picture
 
 
 def _cut(sensor, n, m, first):
@@ -717,23 +429,9 @@ def _joined(cells):
     return cells.reshape(a * b, c * d)
 
 
-@PATCHES.wrong(
-    "These are the first m × m pixels under each microlens. As many are left out before the middle as behind it."
-)
+@PATCHES.wrong("These are the first m × m pixels of each microlens. Leave out as many before the middle as behind.")
 def from_the_corner(sensor, n, m):
     return _joined(_cut(sensor, n, m, 0))
-
-
-@PATCHES.wrong(
-    "These are the last m × m pixels under each microlens. As many are left out before the middle as behind it."
-)
-def from_the_last_corner(sensor, n, m):
-    return _joined(_cut(sensor, n, m, n - m))
-
-
-@PATCHES.wrong("The pixels are the right ones, but each patch is turned by half a turn. Lay them down as they stand.")
-def each_turned(sensor, n, m):
-    return _joined(patches(sensor, n, m).reshape(sensor.shape[0] // n, m, sensor.shape[1] // n, m)[:, ::-1, :, ::-1])
 
 
 @PATCHES.wrong("These are m × m whole *views* side by side. A patch is what lies under one microlens.")
@@ -742,23 +440,11 @@ def views_side_by_side(sensor, n, m):
     return _joined(cells)
 
 
-@PATCHES.wrong("The order of the axes is lost: patches are joined row by row only if their own rows stay in between.")
+@PATCHES.wrong("The axes are in the wrong order for `reshape`: it needs (microlens, pixel, microlens, pixel).")
 def axes_lost(sensor, n, m):
     cells = _cut(sensor, n, m, (n - m) // 2)
     height, _, width, _ = cells.shape
     return cells.transpose(0, 2, 1, 3).reshape(height * m, width * m)
-
-
-@PATCHES.wrong("This repeats the middle pixel of each microlens m × m times: larger, with no more detail.")
-def middle_pixel_repeated(sensor, n, m):
-    return np.kron(sensor[n // 2 :: n, n // 2 :: n], np.ones((m, m)))
-
-
-@PATCHES.wrong(
-    "This is the mean of each microlens's middle pixels: one pixel each. Lay all m × m of them side by side."
-)
-def mean_of_the_patch(sensor, n, m):
-    return _cut(sensor, n, m, (n - m) // 2).mean(axis=(1, 3))
 
 
 @PATCHES.wrong("This is the middle of the whole sensor. Every microlens has a middle of its own.")
@@ -766,11 +452,6 @@ def middle_of_the_sensor(sensor, n, m):
     height, width = sensor.shape[0] // n * m, sensor.shape[1] // n * m
     top, left = (sensor.shape[0] - height) // 2, (sensor.shape[1] - width) // 2
     return sensor[top : top + height, left : left + width]
-
-
-@PATCHES.wrong("Each patch is transposed: its rows lie where its columns belong.")
-def each_transposed(sensor, n, m):
-    return _joined(_cut(sensor, n, m, (n - m) // 2).transpose(0, 3, 2, 1))
 
 
 EXERCISES = (SUB_APERTURE, DISPARITY, REFOCUSED, ALPHA, SLOPE, PATCHES)

@@ -59,20 +59,12 @@ def by_einsum(light, reflectance, sensitivity):
 
 
 @RESPONSE.right
-def with_the_step_in_nanometres(light, reflectance, sensitivity):
-    reaching = (light * reflectance)[..., None] * sensitivity
-    return np.sum(5.0 * reaching, axis=-2) / np.sum(5.0 * light[:, None] * sensitivity, axis=0)
-
-
-@RESPONSE.right
 def as_a_weighted_mean(light, reflectance, sensitivity):
     weights = light[:, None] * sensitivity
     return reflectance @ (weights / weights.sum(axis=0))
 
 
-@RESPONSE.wrong(
-    "This is the sum itself. Divide it, channel by channel, by what a perfect white gives in the same light."
-)
+@RESPONSE.wrong("This is the sum itself. Divide each channel by a perfect white's sum in the same light.")
 def sum_alone(light, reflectance, sensitivity):
     return (light * reflectance) @ sensitivity
 
@@ -87,58 +79,15 @@ def beside_the_sensitivity(light, reflectance, sensitivity):
     return (light * reflectance) @ sensitivity / sensitivity.sum(axis=0)
 
 
-@RESPONSE.wrong("You divide by the sum of the light. A perfect white gives the sum of light times *sensitivity*.")
-def beside_the_light(light, reflectance, sensitivity):
-    return (light * reflectance) @ sensitivity / light.sum()
-
-
-@RESPONSE.wrong("All channels are divided by the white's *green*. Here each channel is to be a share of its own.")
-def beside_green(light, reflectance, sensitivity):
-    return (light * reflectance) @ sensitivity / (light @ sensitivity)[1]
-
-
-@RESPONSE.wrong("The surface is missing: this is what a perfect white gives beside itself.")
-def without_surface(light, reflectance, sensitivity):
-    return np.ones((*np.shape(reflectance)[:-1], 3))
-
-
-@RESPONSE.wrong(
-    "This is the mean reflectance, the same for each channel. A channel weighs wavelengths by its own curve."
-)
-def mean_reflectance(light, reflectance, sensitivity):
-    return np.repeat(np.mean(reflectance, axis=-1, keepdims=True), 3, axis=-1)
-
-
-@RESPONSE.wrong("Upside down: this is how many times brighter the white is than the surface.")
-def upside_down(light, reflectance, sensitivity):
-    return 1 / response(light, reflectance, sensitivity)
-
-
-@RESPONSE.wrong("The light stands in it twice: once in the product, and once more in the sum.")
-def light_twice(light, reflectance, sensitivity):
-    return (light**2 * reflectance) @ sensitivity / (light**2 @ sensitivity)
-
-
-@RESPONSE.wrong(
-    "You multiply two finished sums, one of light and one of reflectance. The product belongs *inside* the sum, "
-    "wavelength by wavelength."
-)
+@RESPONSE.wrong("You multiply the sums of light and of reflectance. Multiply *inside* the sum, per wavelength.")
 def product_of_sums(light, reflectance, sensitivity):
     return (light @ sensitivity) * (reflectance @ sensitivity) / (light @ sensitivity)
 
 
-@RESPONSE.wrong(
-    "`np.trapezoid` counts the first and the last wavelength by half. That is a way to integrate too, but this lesson "
-    "takes the plain sum over the table."
-)
+@RESPONSE.wrong("`np.trapezoid` counts the first and last wavelength by half. This lesson takes the plain sum.")
 def by_trapezoids(light, reflectance, sensitivity):
     halved = light * np.where(np.isin(np.arange(len(light)), (0, len(light) - 1)), 0.5, 1.0)
     return response(halved, reflectance, sensitivity)
-
-
-@RESPONSE.wrong("One surface is right. For many, their wavelengths are the last axis: put `@ sensitivity` behind them.")
-def one_surface_only(light, reflectance, sensitivity):
-    return sensitivity.T @ (light * reflectance) / (light @ sensitivity)
 
 
 # 5: grey world -------------------------------------------------------------------------------------------------------
@@ -172,12 +121,6 @@ GREY_WORLD = Exercise(
 
 
 @GREY_WORLD.right
-def over_all_axes_but_the_last(raw):
-    mean = raw.mean(axis=tuple(range(raw.ndim - 1)))
-    return np.array([mean[1] / mean[0], 1.0, mean[1] / mean[2]])
-
-
-@GREY_WORLD.right
 def from_opencv_s_mean(raw):
     import cv2
 
@@ -185,75 +128,29 @@ def from_opencv_s_mean(raw):
     return green / np.array([red, green, blue])
 
 
-@GREY_WORLD.right
-def from_sums(raw):
-    sums = sum(raw.reshape(-1, 3))
-    return sums[1] / sums
-
-
 @GREY_WORLD.wrong("These are the gains upside down: a weak channel needs *more*.")
 def gains_upside_down(raw):
     return 1 / grey_world(raw)
 
 
-@GREY_WORLD.wrong(
-    "These are the means. The gains are what the channels must be *multiplied* by to make the means equal."
-)
+@GREY_WORLD.wrong("These are the means. *Multiplying* by the gains must make the means equal.")
 def means_alone(raw):
     return raw.reshape(-1, 3).mean(axis=0)
 
 
-@GREY_WORLD.wrong("The means come out equal, at the mean of all three. Here green is to stay as it is: its gain is 1.")
+@GREY_WORLD.wrong("The means come out equal, at the mean of all three. Here green stays as it is: its gain is 1.")
 def at_the_mean_of_all(raw):
     return raw.mean() / raw.reshape(-1, 3).mean(axis=0)
 
 
-@GREY_WORLD.wrong("The means come out equal, at 1: that changes the exposure too. Let green keep its level.")
-def at_one(raw):
-    return 1 / raw.reshape(-1, 3).mean(axis=0)
-
-
-@GREY_WORLD.wrong(
-    "These gains make the *brightest* of each channel equal: that is the white patch, not the grey world."
-)
+@GREY_WORLD.wrong("These gains make the *brightest* of each channel equal: that is white patch, not grey world.")
 def white_patch(raw):
     return raw.reshape(-1, 3).max(axis=0)[1] / raw.reshape(-1, 3).max(axis=0)
 
 
-@GREY_WORLD.wrong("You scale down to the smallest channel, as `cv2.xphoto` does. Here green's gain is to be 1.")
-def down_to_the_smallest(raw):
-    return raw.reshape(-1, 3).mean(axis=0).min() / raw.reshape(-1, 3).mean(axis=0)
-
-
-@GREY_WORLD.wrong("You scale up to the largest channel. Here green's gain is to be 1, whichever channel is largest.")
-def up_to_the_largest(raw):
-    return raw.reshape(-1, 3).mean(axis=0).max() / raw.reshape(-1, 3).mean(axis=0)
-
-
-@GREY_WORLD.wrong("This takes the *median* for grey. Grey world takes the mean.")
-def by_the_median(raw):
-    return np.median(raw.reshape(-1, 3), axis=0)[1] / np.median(raw.reshape(-1, 3), axis=0)
-
-
-@GREY_WORLD.wrong("Red keeps its level in yours. Green is channel 1, and its gain is to be 1.")
-def red_kept(raw):
-    return raw.reshape(-1, 3).mean(axis=0)[0] / raw.reshape(-1, 3).mean(axis=0)
-
-
-@GREY_WORLD.wrong("This is the mean of each colour's own gains. Grey is the *mean colour*: average first, then divide.")
+@GREY_WORLD.wrong("This is the mean of each colour's own gains. Average the colours first, then divide.")
 def mean_of_ratios(raw):
     return (raw[..., 1:2] / raw).reshape(-1, 3).mean(axis=0)
-
-
-@GREY_WORLD.wrong("These are the balanced colours. Asked for are the three gains that do it.")
-def balanced_colours(raw):
-    return raw * grey_world(raw)
-
-
-@GREY_WORLD.wrong("A list of colours is right. A picture has two axes to average over, rows and columns.")
-def first_axis_only(raw):
-    mean = raw.mean(axis=0)
-    return mean[..., 1:2] / mean
 
 
 # 2: find the bug in developing ---------------------------------------------------------------------------------------
@@ -308,19 +205,12 @@ def gains_inside_the_matrix(raw, gains, matrix):
     return np.clip(raw @ (matrix * gains).T, 0, 1) ** (1 / 2.2)
 
 
-@DEVELOP.right
-def step_by_step(raw, gains, matrix):
-    balanced = raw * gains
-    mixed = np.stack([np.sum(row * balanced, axis=-1) for row in matrix], axis=-1)
-    return np.exp(np.log(np.clip(mixed, 1e-300, 1)) / 2.2)
-
-
-@DEVELOP.wrong("Now the gains act on linear data, and the matrix still on encoded ones. It needs light as well.")
+@DEVELOP.wrong("The gains act on linear data now, but the matrix still on encoded values. It needs linear data too.")
 def matrix_on_encoded_values(raw, gains, matrix):
     return np.clip(np.clip(raw * gains, 0, 1) ** (1 / 2.2) @ matrix.T, 0, 1)
 
 
-@DEVELOP.wrong("The order is right now, and the matrix is transposed: colours are rows here, so it is `@ matrix.T`.")
+@DEVELOP.wrong("The order is right now, but the matrix is transposed. Colours are rows here: use `@ matrix.T`.")
 def matrix_transposed(raw, gains, matrix):
     return np.clip((raw * gains) @ matrix, 0, 1) ** (1 / 2.2)
 
@@ -330,50 +220,20 @@ def matrix_before_gains(raw, gains, matrix):
     return np.clip((raw @ matrix.T) * gains, 0, 1) ** (1 / 2.2)
 
 
-@DEVELOP.wrong("Gains and matrix act on light now. The result is still linear: the screen wants its power at the end.")
+@DEVELOP.wrong("Gains and matrix act on linear data now. The result is still linear: take the power at the end.")
 def without_gamma(raw, gains, matrix):
     return np.clip((raw * gains) @ matrix.T, 0, 1)
 
 
-@DEVELOP.wrong("The power at the end is upside down: encoding makes the darks *lighter*.")
-def gamma_upside_down(raw, gains, matrix):
-    return np.clip((raw * gains) @ matrix.T, 0, 1) ** 2.2
-
-
-@DEVELOP.wrong("The values are encoded twice, at the beginning and at the end. Once is right, at the end.")
-def encoded_twice(raw, gains, matrix):
-    return develop_as_given(raw, gains, matrix) ** (1 / 2.2)
-
-
-@DEVELOP.wrong("The order is right. Cut off *before* the power: of a negative number it is not a number.")
-def cut_off_too_late(raw, gains, matrix):
-    return np.clip(((raw * gains) @ matrix.T) ** (1 / 2.2), 0, 1)
-
-
-@DEVELOP.wrong("The order is right. Nothing is cut off: a screen shows 0 … 1, and a negative number has no such power.")
-def nothing_cut_off(raw, gains, matrix):
-    return ((raw * gains) @ matrix.T) ** (1 / 2.2)
-
-
-@DEVELOP.wrong("You cut off between gains and matrix too. What is above 1 there may come back below it: cut off once.")
+@DEVELOP.wrong("You cut off between gains and matrix too. The matrix may bring values above 1 back: cut off once.")
 def cut_off_in_between(raw, gains, matrix):
     return np.clip(np.clip(raw * gains, 0, 1) @ matrix.T, 0, 1) ** (1 / 2.2)
 
 
-@DEVELOP.wrong("The order is right. This is the curve of sRGB, straight near black; the plain power is asked for here.")
+@DEVELOP.wrong("The order is right. This is the curve of sRGB; here take the plain power 1/2.2.")
 def with_the_curve_of_srgb(raw, gains, matrix):
     light = np.clip((raw * gains) @ matrix.T, 0, 1)
     return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-
-
-@DEVELOP.wrong("You divide by the gains. A gain multiplies: a weak channel has a gain above 1.")
-def divided_by_gains(raw, gains, matrix):
-    return np.clip((raw / gains) @ matrix.T, 0, 1) ** (1 / 2.2)
-
-
-@DEVELOP.wrong("The gains are gone. The matrix was fitted to balanced colours: multiply by them first.")
-def without_gains(raw, gains, matrix):
-    return np.clip(raw @ matrix.T, 0, 1) ** (1 / 2.2)
 
 
 # 4: the matrix -------------------------------------------------------------------------------------------------------
@@ -419,73 +279,25 @@ def by_opencv_s_solver(raw, target):
     return cv2.solve(raw, target, flags=cv2.DECOMP_SVD)[1].T
 
 
-@FIT_MATRIX.right
-def by_the_pseudo_inverse(raw, target):
-    return target.T @ np.linalg.pinv(raw.T)
-
-
-@FIT_MATRIX.right
-def row_by_row(raw, target):
-    q, r = np.linalg.qr(raw)
-    return np.array([np.linalg.solve(r, q.T @ target[:, channel]) for channel in range(3)])
-
-
 @FIT_MATRIX.wrong("This is M transposed: `raw @ X ≈ target` gives X = Mᵀ. It is the convention of `cv2.ccm`.")
 def transposed(raw, target):
     return fit_matrix(raw, target).T
 
 
-@FIT_MATRIX.wrong("This matrix goes the other way, from target to raw: change places in `lstsq`.")
-def backwards(raw, target):
-    return fit_matrix(target, raw)
-
-
-@FIT_MATRIX.wrong(
-    "You fitted target → raw and inverted. That makes the error of the *raw* colours least, not of the result."
-)
+@FIT_MATRIX.wrong("You fitted target → raw and inverted. That makes the *raw* colours' error least, not the result's.")
 def backwards_and_inverted(raw, target):
     return np.linalg.inv(fit_matrix(target, raw))
 
 
-@FIT_MATRIX.wrong("This is diagonal: three gains. A matrix also takes from each channel what belongs to another.")
+@FIT_MATRIX.wrong("This is diagonal: three gains. A matrix also mixes the channels.")
 def three_gains(raw, target):
     return np.diag((raw * target).sum(axis=0) / (raw**2).sum(axis=0))
 
 
-@FIT_MATRIX.wrong("You solve for the first three colours exactly. The others have a say too: least squares over all.")
-def first_three_colours(raw, target):
-    return np.linalg.solve(raw[:3], target[:3]).T
-
-
-@FIT_MATRIX.wrong("This is rawᵀ target. The normal equations divide by rawᵀ raw, with `np.linalg.solve`.")
-def without_the_inverse(raw, target):
-    return (raw.T @ target).T
-
-
-@FIT_MATRIX.wrong("You fitted an offset as well and left it out in the end. Black stays black: three columns, no ones.")
-def with_an_offset(raw, target):
-    return np.linalg.lstsq(np.column_stack([raw, np.ones(len(raw))]), target, rcond=None)[0][:3].T
-
-
-@FIT_MATRIX.wrong("You scale the rows until each adds up to 1. That keeps white, but it is not asked for here.")
+@FIT_MATRIX.wrong("You scale the rows until each adds up to 1. That keeps white, but the task does not ask for it.")
 def white_kept(raw, target):
     matrix = fit_matrix(raw, target)
     return matrix / matrix.sum(axis=1, keepdims=True)
-
-
-@FIT_MATRIX.wrong("`lstsq` returns four things: the solution, residuals, rank and singular values. Take the first.")
-def all_that_lstsq_returns(raw, target):
-    return np.linalg.lstsq(raw, target, rcond=None)
-
-
-@FIT_MATRIX.wrong("These are the errors that remain. Asked for is the matrix that makes them least.")
-def errors_that_remain(raw, target):
-    return raw @ fit_matrix(raw, target).T - target
-
-
-@FIT_MATRIX.wrong("You average over the colours first. One mean colour cannot tell how channels are to be mixed.")
-def from_the_mean_colour(raw, target):
-    return np.diag(target.mean(axis=0) / raw.mean(axis=0))
 
 
 # 3: what the sensor is blind to --------------------------------------------------------------------------------------
@@ -532,82 +344,27 @@ def onto_the_null_space(change, sensor):
     return blind @ (blind.T @ change)
 
 
-@UNSEEN.right
-def off_an_orthonormal_basis(change, sensor):
-    basis = np.linalg.qr(sensor)[0]
-    return change - basis @ (basis.T @ change)
-
-
 @UNSEEN.wrong("This is the part that the sensor *does* notice. Subtract it from the change.")
 def seen_part(change, sensor):
     return change - unseen(change, sensor)
 
 
-@UNSEEN.wrong(
-    "You took away each channel's share by itself. The curves overlap, so their shares count twice: solve for the "
-    "three weights together."
-)
+@UNSEEN.wrong("You subtract each curve's part by itself. The curves overlap: solve for the three weights together.")
 def each_curve_by_itself(change, sensor):
     return change - sensor @ (sensor.T @ change / (sensor**2).sum(axis=0))
 
 
-@UNSEEN.wrong("The weights are not Sᵀ change, but the solution of (SᵀS) w = Sᵀ change: the curves are no unit vectors.")
+@UNSEEN.wrong("The weights are not Sᵀ change. They solve (SᵀS) w = Sᵀ change: the curves are no unit vectors.")
 def without_solving(change, sensor):
     return change - sensor @ (sensor.T @ change)
 
 
-@UNSEEN.wrong("Of nothing the sensor notices nothing, indeed. Asked for is what is left of *this* change.")
-def nothing(change, sensor):
-    return np.zeros_like(change)
-
-
-@UNSEEN.wrong("You took away the mean. The sensor notices more than a level: it has three curves.")
-def mean_taken_away(change, sensor):
-    return change - change.mean()
-
-
-@UNSEEN.wrong("Green notices nothing any more. Red and blue still do: all three curves must be taken away.")
-def green_only(change, sensor):
-    green = sensor[:, 1]
-    return change - green * (green @ change) / (green @ green)
-
-
-@UNSEEN.wrong(
-    "You take the curves away one after another. Each one brings back some of those before it, because they overlap: "
-    "solve for the three weights together."
-)
+@UNSEEN.wrong("You subtract one curve after another. Each brings back part of those before: solve for all three.")
 def one_after_another(change, sensor):
     left = change
     for curve in sensor.T:
         left = left - curve * (curve @ left) / (curve @ curve)
     return left
-
-
-@UNSEEN.wrong("The sign is flipped: it is the change minus the mixture, not the mixture minus the change.")
-def mixture_minus_change(change, sensor):
-    return -unseen(change, sensor)
-
-
-@UNSEEN.wrong(
-    "The sensor is blind to this spectrum too, but it is not the part of *this* change: it never looks at it."
-)
-def another_blind_spectrum(change, sensor):
-    return np.linalg.svd(sensor.T)[2][-1]
-
-
-@UNSEEN.wrong("You allow no negative weights. A mixture may subtract a curve: this is arithmetic, not light.")
-def no_negative_weights(change, sensor):
-    return change - sensor @ np.maximum(np.linalg.solve(sensor.T @ sensor, sensor.T @ change), 0)
-
-
-@UNSEEN.wrong("You divide by the *sum* of each curve. A fit divides by the sum of its squares, and by what overlaps.")
-def divided_by_sums(change, sensor):
-    return change - sensor @ (sensor.T @ change / sensor.sum(axis=0))
-
-
-@UNSEEN.wrong("These are the weights of the mixture. Put the mixture together, and take it away from the change.")
-def weights_alone(change, sensor):
-    return np.linalg.solve(sensor.T @ sensor, sensor.T @ change)
 
 
 # 6: between two matrices ---------------------------------------------------------------------------------------------
@@ -650,29 +407,13 @@ def by_interpolating_each_entry(kelvin, warm, cold):
     return np.array([np.interp(1 / kelvin, [1 / 6504, 1 / 2856], pair) for pair in known]).reshape(3, 3)
 
 
-@BETWEEN.right
-def by_holding_the_temperature(kelvin, warm, cold):
-    held = min(max(kelvin, 2856), 6504)
-    share = (1e6 / held - 1e6 / 6504) / (1e6 / 2856 - 1e6 / 6504)
-    return cold + share * (warm - cold)
-
-
-@BETWEEN.right
-def by_cases(kelvin, warm, cold):
-    if kelvin <= 2856:
-        return warm
-    if kelvin >= 6504:
-        return cold
-    return (warm * 2856 * (6504 - kelvin) + cold * 6504 * (kelvin - 2856)) / (kelvin * (6504 - 2856))
-
-
-@BETWEEN.wrong("Your share goes evenly with the temperature itself. It is to go evenly with *one divided by* it.")
+@BETWEEN.wrong("Your share goes evenly with the temperature. It must go evenly with *one divided by* it.")
 def evenly_with_temperature(kelvin, warm, cold):
     share = np.clip((6504 - kelvin) / (6504 - 2856), 0, 1)
     return share * warm + (1 - share) * cold
 
 
-@BETWEEN.wrong("Between the two lights this is right. Beyond them the share is to stay: hold it between 0 and 1.")
+@BETWEEN.wrong("This is right between the two lights. Beyond them the share stays: clip it to 0 … 1.")
 def goes_on_beyond(kelvin, warm, cold):
     share = (1 / kelvin - 1 / 6504) / (1 / 2856 - 1 / 6504)
     return share * warm + (1 - share) * cold
@@ -683,33 +424,7 @@ def places_changed(kelvin, warm, cold):
     return between(kelvin, cold, warm)
 
 
-@BETWEEN.wrong("You take the nearer of the two matrices. Between the lights it is to be a mixture of both.")
-def the_nearer_one(kelvin, warm, cold):
-    return warm if 1 / kelvin > (1 / 2856 + 1 / 6504) / 2 else cold
-
-
-@BETWEEN.wrong("You take the mean of the two whatever the light is. How much of each is needed depends on it.")
-def always_the_mean(kelvin, warm, cold):
-    return (warm + cold) / 2
-
-
-@BETWEEN.wrong("You add both with shares that do not make 1 together: where one has s, the other needs 1 − s.")
-def shares_do_not_make_one(kelvin, warm, cold):
-    share = np.clip((1 / kelvin - 1 / 6504) / (1 / 2856 - 1 / 6504), 0, 1)
-    return share * warm + cold
-
-
-@BETWEEN.wrong("This is the share of the warm matrix. Mix the two matrices with it.")
-def share_alone(kelvin, warm, cold):
-    return np.clip((1 / kelvin - 1 / 6504) / (1 / 2856 - 1 / 6504), 0, 1)
-
-
-@BETWEEN.wrong("You mix the *inverses* of the matrices. Mix the matrices as they are given.")
-def inverses_mixed(kelvin, warm, cold):
-    return np.linalg.inv(between(kelvin, np.linalg.inv(warm), np.linalg.inv(cold)))
-
-
-@BETWEEN.wrong("Your share goes evenly with the *logarithm* of the temperature. It is to go evenly with 1/kelvin.")
+@BETWEEN.wrong("Your share goes evenly with the *logarithm* of the temperature. It must go evenly with 1/kelvin.")
 def evenly_with_the_logarithm(kelvin, warm, cold):
     share = np.clip(np.log(6504 / kelvin) / np.log(6504 / 2856), 0, 1)
     return share * warm + (1 - share) * cold

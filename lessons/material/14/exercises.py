@@ -53,13 +53,6 @@ def with_the_constants_of_nature(lux, f_number, pitch_um, exposure_s, efficiency
 
 
 @EXPECTED_ELECTRONS.right
-def with_the_aperture_s_angle(lux, f_number, pitch_um, exposure_s, efficiency):
-    luminance = lux / np.pi
-    solid_angle = np.pi / (4 * f_number**2)
-    return 4091 * efficiency * exposure_s * pitch_um**2 * luminance * solid_angle
-
-
-@EXPECTED_ELECTRONS.right
 def in_single_precision(lux, f_number, pitch_um, exposure_s, efficiency):
     dose = np.asarray(lux, dtype=np.float32) * np.float32(exposure_s) / np.float32(2 * f_number) ** 2
     return np.float32(4091 * efficiency) * dose * np.float32(pitch_um) ** 2
@@ -70,34 +63,12 @@ def pitch_for_area(lux, f_number, pitch_um, exposure_s, efficiency):
     return expected_electrons(lux, f_number, 1.0, exposure_s, efficiency) * pitch_um
 
 
-@EXPECTED_ELECTRONS.wrong("The pixel is a square in this exercise. Yours is a circle as wide as the pitch.")
-def a_round_pixel(lux, f_number, pitch_um, exposure_s, efficiency):
-    return expected_electrons(lux, f_number, 1.0, exposure_s, efficiency) * np.pi * (pitch_um / 2) ** 2
-
-
-@EXPECTED_ELECTRONS.wrong("The photons are counted per µm². You turned the pitch into metres, which they do not want.")
-def pitch_in_metres(lux, f_number, pitch_um, exposure_s, efficiency):
-    return expected_electrons(lux, f_number, 1e-6 * pitch_um, exposure_s, efficiency)
-
-
 @EXPECTED_ELECTRONS.wrong("The f-number enters squared: it sets the aperture's *diameter*, and light uses the area.")
 def f_number_not_squared(lux, f_number, pitch_um, exposure_s, efficiency):
     return 4091 * efficiency * lux / (4 * f_number) * exposure_s * pitch_um**2
 
 
-@EXPECTED_ELECTRONS.wrong("The 4 below is missing: E = π L / (4 N²), and a matt white wall has π L = lux.")
-def without_the_four(lux, f_number, pitch_um, exposure_s, efficiency):
-    return 4 * expected_electrons(lux, f_number, pitch_um, exposure_s, efficiency)
-
-
-@EXPECTED_ELECTRONS.wrong("There is a π too much: it is π L that equals the wall's lux, so that no π is left.")
-def luminance_taken_for_lux(lux, f_number, pitch_um, exposure_s, efficiency):
-    return np.pi * expected_electrons(lux, f_number, pitch_um, exposure_s, efficiency)
-
-
-@EXPECTED_ELECTRONS.wrong(
-    "`lux / 4 * f_number**2` divides by 4 and then *multiplies* by N². Brackets around the whole divisor mend it."
-)
+@EXPECTED_ELECTRONS.wrong("`lux / 4 * f_number**2` *multiplies* by N². Put brackets around the divisor.")
 def brackets_forgotten(lux, f_number, pitch_um, exposure_s, efficiency):
     return 4091 * efficiency * (lux / 4 * f_number**2) * exposure_s * pitch_um**2
 
@@ -110,21 +81,6 @@ def without_a_lens(lux, f_number, pitch_um, exposure_s, efficiency):
 @EXPECTED_ELECTRONS.wrong("These are the *photons*. Only a share η of them frees an electron.")
 def photons(lux, f_number, pitch_um, exposure_s, efficiency):
     return expected_electrons(lux, f_number, pitch_um, exposure_s, 1.0)
-
-
-@EXPECTED_ELECTRONS.wrong("You divide by η: that is how many photons it takes. Here photons are given: multiply.")
-def divided_by_the_efficiency(lux, f_number, pitch_um, exposure_s, efficiency):
-    return expected_electrons(lux, f_number, pitch_um, exposure_s, 1 / efficiency)
-
-
-@EXPECTED_ELECTRONS.wrong("These are electrons per *second*: the exposure is missing.")
-def a_rate(lux, f_number, pitch_um, exposure_s, efficiency):
-    return expected_electrons(lux, f_number, pitch_um, 1.0, efficiency)
-
-
-@EXPECTED_ELECTRONS.wrong("The exposure is in seconds already, as its name says; you treat it as milliseconds.")
-def exposure_in_milliseconds(lux, f_number, pitch_um, exposure_s, efficiency):
-    return expected_electrons(lux, f_number, pitch_um, exposure_s / 1000, efficiency)
 
 
 # 1: a lamp's stripes -------------------------------------------------------------------------------------------------
@@ -166,77 +122,28 @@ def by_rows_in_a_stripe(stripes, rows, mains_hz):
 
 
 @ROW_TIME.right
-def by_the_period(stripes, rows, mains_hz):
-    period_s = 1 / mains_hz
-    return period_s / 2 * np.asarray(stripes) / rows
-
-
-@ROW_TIME.right
 def stripe_by_stripe_as_a_list(stripes, rows, mains_hz):
     return np.reshape([one / 2 / mains_hz / rows for one in np.ravel(stripes).tolist()], np.shape(stripes)).tolist()
 
 
-@ROW_TIME.right
-def by_the_frames_in_a_second(stripes, rows, mains_hz):
-    frames_per_s = 2 * mains_hz / np.asarray(stripes)
-    return np.reciprocal(frames_per_s * rows)
-
-
-@ROW_TIME.wrong("A factor of 2 too long: the current flows both ways, so the lamp is bright *twice* in each period.")
+@ROW_TIME.wrong("This is twice too long: the current flows both ways, so the lamp is bright *twice* in each period.")
 def bright_once_in_a_period(stripes, rows, mains_hz):
     return np.asarray(stripes) / mains_hz / rows
 
 
-@ROW_TIME.wrong("Twice as often bright means *shorter* stripes: double the mains frequency, do not halve it.")
-def half_the_frequency(stripes, rows, mains_hz):
-    return np.asarray(stripes) / (mains_hz / 2) / rows
-
-
-@ROW_TIME.wrong("This is the time of the whole frame. From one row to the next is one `rows`-th of it.")
+@ROW_TIME.wrong("This is the time of the whole frame. Divide it by `rows`.")
 def the_whole_frame(stripes, rows, mains_hz):
     return np.asarray(stripes) / (2 * mains_hz)
 
 
-@ROW_TIME.wrong("This is how long one stripe lasts, half a period. The frame has `stripes` of them and `rows` rows.")
-def one_stripe(stripes, rows, mains_hz):
-    return np.full(np.shape(stripes), 1 / (2 * mains_hz))
-
-
-@ROW_TIME.wrong(
-    "More stripes mean a *slower* sensor: the more often the lamp is bright meanwhile, the longer the frame."
-)
+@ROW_TIME.wrong("More stripes mean a *slower* sensor: the lamp is bright more often during the frame.")
 def fewer_with_more_stripes(stripes, rows, mains_hz):
     return 1 / (2 * mains_hz * rows * np.asarray(stripes))
 
 
-@ROW_TIME.wrong("This is how many rows a stripe is wide. Ask next how long they take.")
-def rows_in_a_stripe(stripes, rows, mains_hz):
-    return rows / np.asarray(stripes)
-
-
-@ROW_TIME.wrong("This is how many rows are read in a second. The question is how many seconds a row takes.")
-def rows_per_second(stripes, rows, mains_hz):
-    return 2 * mains_hz * rows / np.asarray(stripes)
-
-
-@ROW_TIME.wrong("You multiply by the frequency. Hertz are *per second*: divide by them to come to seconds.")
-def multiplied_by_hertz(stripes, rows, mains_hz):
-    return np.asarray(stripes) * 2 * mains_hz / rows
-
-
-@ROW_TIME.wrong("In microseconds this is right. Seconds are asked for.")
-def in_microseconds(stripes, rows, mains_hz):
-    return 1e6 * row_time(stripes, rows, mains_hz)
-
-
-@ROW_TIME.wrong("Your function fits mains of 50 Hz only. Elsewhere they have 60: use `mains_hz`.")
+@ROW_TIME.wrong("Your function fits mains of 50 Hz only. Some mains have 60 Hz: use `mains_hz`.")
 def fifty_hertz_written_in(stripes, rows, mains_hz):
     return np.asarray(stripes) / 100 / rows
-
-
-@ROW_TIME.wrong("You count the gaps between stripes. `stripes` says how often the lamp was bright: take all of them.")
-def gaps_between_stripes(stripes, rows, mains_hz):
-    return (np.asarray(stripes) - 1) / (2 * mains_hz) / rows
 
 
 @ROW_TIME.wrong("The stripes fill all rows of the frame, its last one too: divide by `rows`, not by one less.")
@@ -285,47 +192,9 @@ def as_a_difference_of_levels(saturation_e, dark_noise_e):
     return 20 * np.log10(saturation_e) - 20 * np.log10(np.asarray(dark_noise_e) + 0.5)
 
 
-@DYNAMIC_RANGE_DB.right
-def with_the_base_changed(saturation_e, dark_noise_e):
-    return 20 / np.log(10) * np.log(np.asarray(saturation_e) / (np.asarray(dark_noise_e) + 0.5))
-
-
-@DYNAMIC_RANGE_DB.right
-def in_a_loop(saturation_e, dark_noise_e):
-    import math
-
-    pairs = np.broadcast(saturation_e, dark_noise_e)
-    values = [20 * math.log10(most / (noise + 0.5)) for most, noise in pairs]
-    return np.reshape(values, pairs.shape)
-
-
-def _ratio(saturation_e, dark_noise_e):
-    return np.asarray(saturation_e) / (np.asarray(dark_noise_e) + 0.5)
-
-
-@DYNAMIC_RANGE_DB.wrong("The logarithm is right now, and the result is half: ratios of signals take 20, of powers 10.")
-def ten_for_twenty(saturation_e, dark_noise_e):
-    return 10 * np.log10(_ratio(saturation_e, dark_noise_e))
-
-
-@DYNAMIC_RANGE_DB.wrong("It was the logarithm that was at fault, and not the 20: with 10 the fault is only halved.")
+@DYNAMIC_RANGE_DB.wrong("The 20 was right, and the logarithm is still wrong. Change its base, not the 20.")
 def ten_with_the_natural_logarithm(saturation_e, dark_noise_e):
-    return 10 * np.log(_ratio(saturation_e, dark_noise_e))
-
-
-@DYNAMIC_RANGE_DB.wrong("The 20 is lost. This is the exponent of ten; decibels are twenty times as many.")
-def without_the_twenty(saturation_e, dark_noise_e):
-    return np.log10(_ratio(saturation_e, dark_noise_e))
-
-
-@DYNAMIC_RANGE_DB.wrong("These are stops, factors of 2. Decibels are 20 times the logarithm to another base.")
-def stops(saturation_e, dark_noise_e):
-    return np.log2(_ratio(saturation_e, dark_noise_e))
-
-
-@DYNAMIC_RANGE_DB.wrong("The logarithm to base 2 counts stops. Twenty times as many of those are no decibels either.")
-def twenty_times_stops(saturation_e, dark_noise_e):
-    return 20 * np.log2(_ratio(saturation_e, dark_noise_e))
+    return 10 * np.log(np.asarray(saturation_e) / (np.asarray(dark_noise_e) + 0.5))
 
 
 @DYNAMIC_RANGE_DB.wrong("The logarithm is right now, but you divide by the dark noise alone. The threshold is σ_d + ½.")
@@ -338,32 +207,11 @@ def half_added_to_the_ratio(saturation_e, dark_noise_e):
     return 20 * np.log10(np.asarray(saturation_e) / np.asarray(dark_noise_e) + 0.5)
 
 
-@DYNAMIC_RANGE_DB.wrong("The threshold lies half an electron *above* the dark noise. You took the half away.")
-def half_taken_away(saturation_e, dark_noise_e):
-    return 20 * np.log10(np.asarray(saturation_e) / (np.asarray(dark_noise_e) - 0.5))
-
-
 @DYNAMIC_RANGE_DB.wrong(
-    "That is the exact threshold, ½ + √(σ² + ¼), and good physics. The published file was made with σ_d + ½, and its "
-    "figure can only be mended with the same: leave the ratio as it was."
+    "The exact threshold is good physics. The published file used σ_d + ½: leave the ratio as it was."
 )
 def over_the_exact_threshold(saturation_e, dark_noise_e):
     return 20 * np.log10(np.asarray(saturation_e) / (0.5 + np.sqrt(np.asarray(dark_noise_e) ** 2 + 0.25)))
-
-
-@DYNAMIC_RANGE_DB.wrong("The ratio stands on its head: saturation over threshold is above 1, and its decibels above 0.")
-def upside_down(saturation_e, dark_noise_e):
-    return -20 * np.log10(_ratio(saturation_e, dark_noise_e))
-
-
-@DYNAMIC_RANGE_DB.wrong("You divide one logarithm by the other. The logarithm of a ratio is their *difference*.")
-def quotient_of_logarithms(saturation_e, dark_noise_e):
-    return 20 * np.log10(saturation_e) / np.log10(np.asarray(dark_noise_e) + 0.5)
-
-
-@DYNAMIC_RANGE_DB.wrong("You subtract the threshold from the saturation. A range in decibels is of their *ratio*.")
-def difference_for_ratio(saturation_e, dark_noise_e):
-    return 20 * np.log10(np.asarray(saturation_e) - (np.asarray(dark_noise_e) + 0.5))
 
 
 # 3: what arrives in its own packet -----------------------------------------------------------------------------------
@@ -398,43 +246,15 @@ ARRIVING = Exercise(
 
 
 @ARRIVING.right
-def shift_by_shift(electrons, efficiency):
-    left = np.array(electrons, dtype=float)
-    for row in range(len(left)):
-        left[row:] *= efficiency  # the rows that are still on their way
-    return left
-
-
-@ARRIVING.right
-def by_a_running_product(electrons, efficiency):
-    return electrons * np.cumprod(np.full(len(electrons), efficiency))
-
-
-@ARRIVING.right
 def by_the_binomial_law(electrons, efficiency):
     from scipy.stats import nbinom
 
     return electrons * nbinom.pmf(0, 1 + np.arange(len(electrons)), efficiency)
 
 
-@ARRIVING.wrong("One shift too few: even row 0 must be shifted once, into the register.")
+@ARRIVING.wrong("This is one shift too few: even row 0 must be shifted once, into the register.")
 def row_0_not_shifted(electrons, efficiency):
     return electrons * efficiency ** np.arange(len(electrons))
-
-
-@ARRIVING.wrong("One shift too many: row 0 is *one* shift away from the register, and row i is i + 1.")
-def row_0_shifted_twice(electrons, efficiency):
-    return electrons * efficiency ** (2 + np.arange(len(electrons)))
-
-
-@ARRIVING.wrong("Every row loses as much in yours, once. A farther one has a longer way: multiply once for each shift.")
-def one_shift_for_all(electrons, efficiency):
-    return electrons * efficiency
-
-
-@ARRIVING.wrong("Every row takes as many shifts as the column is high in yours. The near ones arrive sooner.")
-def the_whole_way_for_all(electrons, efficiency):
-    return electrons * efficiency ** len(electrons)
 
 
 @ARRIVING.wrong("Losses do not add, they multiply: each shift leaves behind a share of what is *still there*.")
@@ -442,39 +262,17 @@ def losses_added(electrons, efficiency):
     return electrons * (1 - (1 - efficiency) * (1 + np.arange(len(electrons))))
 
 
-@ARRIVING.wrong("The exponential is a good approximation where hardly anything is lost. A power is exact, and simpler.")
-def exponential(electrons, efficiency):
-    return electrons * np.exp(-(1 - efficiency) * (1 + np.arange(len(electrons))))
-
-
-@ARRIVING.wrong("You *multiply* by the number of shifts. Shift after shift multiplies by the efficiency: a power.")
-def times_the_shifts(electrons, efficiency):
-    return electrons * efficiency * (1 + np.arange(len(electrons)))
-
-
-@ARRIVING.wrong("1 − efficiency is the share left behind. What moves on at each shift is the efficiency itself.")
+@ARRIVING.wrong("1 − efficiency is the share left behind. The efficiency itself moves on at each shift.")
 def the_share_left_behind(electrons, efficiency):
     return electrons * (1 - efficiency) ** (1 + np.arange(len(electrons)))
 
 
-@ARRIVING.wrong("This is what each row has *lost* on its way. The question is what is left.")
-def what_is_lost(electrons, efficiency):
-    return electrons - arriving(electrons, efficiency)
-
-
-@ARRIVING.wrong("The order is turned round: row 0 is the nearest to the register and has the shortest way.")
+@ARRIVING.wrong("The order is reversed: row 0 is the nearest to the register and has the shortest way.")
 def far_rows_first(electrons, efficiency):
     return electrons * (efficiency ** (1 + np.arange(len(electrons))))[::-1]
 
 
-@ARRIVING.wrong(
-    "`efficiency**1 + np.arange(…)` is a power *and then* a sum: `**` binds first. Brackets round the exponent mend it."
-)
-def brackets_around_the_exponent_forgotten(electrons, efficiency):
-    return electrons * (efficiency**1 + np.arange(len(electrons)))
-
-
-@ARRIVING.wrong("The trails of the rows before have been let in. Only what arrives in its *own* packet counts here.")
+@ARRIVING.wrong("You count the trails of other rows. Only what arrives in its *own* packet counts here.")
 def with_the_trails(electrons, efficiency):
     buckets, arrived = np.array(electrons, dtype=float), []
     for _ in range(len(buckets)):
@@ -519,26 +317,13 @@ RESET_NOISE_E = Exercise(
 
 
 @RESET_NOISE_E.right
-def by_the_voltage(uv_per_electron, kelvin):
-    gain = 1e-6 * np.asarray(uv_per_electron)
-    volts = np.sqrt(1.380649e-23 * kelvin * gain / 1.602176634e-19)  # √(k T / C)
-    return volts / gain
-
-
-@RESET_NOISE_E.right
 def by_the_constants_of_scipy(uv_per_electron, kelvin):
     from scipy import constants
 
     return np.sqrt(constants.k * kelvin / constants.e / (1e-6 * np.asarray(uv_per_electron)))
 
 
-@RESET_NOISE_E.right
-def by_the_thermal_voltage(uv_per_electron, kelvin):
-    thermal_uv = 1e6 * 1.380649e-23 * kelvin / 1.602176634e-19
-    return (thermal_uv / np.asarray(uv_per_electron)) ** 0.5
-
-
-@RESET_NOISE_E.wrong("Next to nothing: is the root there, is only k T C under it, and is it divided by the charge q?")
+@RESET_NOISE_E.wrong("This is far too small. Take √(k T C), with only k T C under the root, over the charge q.")
 def without_the_root(uv_per_electron, kelvin):
     return BOLTZMANN * kelvin * (CHARGE / (1e-6 * np.asarray(uv_per_electron))) / CHARGE
 
@@ -548,24 +333,7 @@ def in_volts(uv_per_electron, kelvin):
     return 1e-6 * np.asarray(uv_per_electron) * reset_noise_e(uv_per_electron, kelvin)
 
 
-@RESET_NOISE_E.wrong("This is the noise in microvolts. Divide by the µV that one electron makes.")
-def in_microvolts(uv_per_electron, kelvin):
-    return np.asarray(uv_per_electron) * reset_noise_e(uv_per_electron, kelvin)
-
-
-@RESET_NOISE_E.wrong(
-    "The gain is in *micro*volts. In volts it is a millionth, and the capacitance a million times yours."
-)
-def microvolts_taken_for_volts(uv_per_electron, kelvin):
-    return reset_noise_e(1e6 * np.asarray(uv_per_electron), kelvin)
-
-
-@RESET_NOISE_E.wrong("A microvolt is 1e-6 V. You took 1e-3, which is a millivolt.")
-def microvolts_taken_for_millivolts(uv_per_electron, kelvin):
-    return reset_noise_e(1e3 * np.asarray(uv_per_electron), kelvin)
-
-
-@RESET_NOISE_E.wrong("You have the gain where the capacitance belongs. The gain is q/C, so C is q divided by it.")
+@RESET_NOISE_E.wrong("You use the gain as the capacitance. The gain is q/C, so C is q divided by it.")
 def gain_for_capacitance(uv_per_electron, kelvin):
     return np.sqrt(BOLTZMANN * kelvin * 1e-6 * np.asarray(uv_per_electron)) / CHARGE
 
@@ -573,11 +341,6 @@ def gain_for_capacitance(uv_per_electron, kelvin):
 @RESET_NOISE_E.wrong("The temperature is in kelvin already, as its name says. You add 273.15 once more.")
 def celsius_taken(uv_per_electron, kelvin):
     return reset_noise_e(uv_per_electron, np.asarray(kelvin) + 273.15)
-
-
-@RESET_NOISE_E.wrong("Your function is for 300 K only. Use `kelvin`: a cooled sensor has less.")
-def at_room_temperature(uv_per_electron, kelvin):
-    return reset_noise_e(uv_per_electron, 300.0)
 
 
 EXERCISES = (ROW_TIME, DYNAMIC_RANGE_DB, ARRIVING, EXPECTED_ELECTRONS, RESET_NOISE_E)

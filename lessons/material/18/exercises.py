@@ -64,25 +64,6 @@ MEET = Exercise(
 
 
 @MEET.right
-def by_two_equations(a, b, c, d):
-    along, other = b - a, d - c
-    w = along[0] * other[1] - along[1] * other[0]
-    if w == 0:
-        return np.array([np.nan, np.nan])
-    s = ((c - a)[0] * other[1] - (c - a)[1] * other[0]) / w
-    return a + s * along
-
-
-@MEET.right
-def by_a_linear_system(a, b, c, d):
-    try:
-        s, _ = np.linalg.solve(np.column_stack([b - a, c - d]), c - a)
-    except np.linalg.LinAlgError:
-        return [np.nan, np.nan]
-    return (a + s * (b - a)).tolist()
-
-
-@MEET.right
 def by_opencv_s_convert(a, b, c, d):
     first, second = np.cross([*a, 1.0], [*b, 1.0]), np.cross([*c, 1.0], [*d, 1.0])
     point = np.cross(first / np.linalg.norm(first[:2]), second / np.linalg.norm(second[:2]))
@@ -91,31 +72,15 @@ def by_opencv_s_convert(a, b, c, d):
     return cv2.convertPointsFromHomogeneous(point[None])[0, 0]
 
 
-@MEET.wrong("Where the lines are parallel, w is 0 and there is no such point: answer NaN, not infinity.")
-def infinite_for_parallel_lines(a, b, c, d):
-    x, y, w = np.cross(np.cross([*a, 1], [*b, 1]), np.cross([*c, 1], [*d, 1]))
-    return np.array([x, y]) / np.float64(w)
-
-
-@MEET.wrong("The third number w is not divided out. Pixels are (x/w, y/w).")
+@MEET.wrong("You did not divide by the third number w. Pixels are (x/w, y/w).")
 def not_divided(a, b, c, d):
     x, y, w = np.cross(np.cross([*a, 1], [*b, 1]), np.cross([*c, 1], [*d, 1]))
     return np.array([x, y]) if w else NOWHERE
 
 
-@MEET.wrong("You divide by −w. The three numbers of a cross product belong together: divide by the third as it is.")
-def divided_by_minus_w(a, b, c, d):
-    return -meet(a, b, c, d)
-
-
-@MEET.wrong("Your lines run through a, c and through b, d. The first is to run through a and b.")
+@MEET.wrong("Your lines run through a, c and through b, d. The first runs through a and b.")
 def lines_across(a, b, c, d):
     return meet(a, c, b, d)
-
-
-@MEET.wrong("Your lines run through a, d and through b, c. The first is to run through a and b.")
-def lines_crosswise(a, b, c, d):
-    return meet(a, d, b, c)
 
 
 @MEET.wrong("An upright line has no slope, and yours answers NaN for it. The cross product needs no slopes.")
@@ -126,21 +91,9 @@ def by_slopes(a, b, c, d):
     return point if np.isfinite(point).all() else NOWHERE
 
 
-@MEET.wrong("This is the middle of the four points. The lines go on beyond their ends.")
-def middle_of_all(a, b, c, d):
-    return (a + b + c + d) / 4 if np.isfinite(meet(a, b, c, d)).all() else NOWHERE
-
-
-@MEET.wrong("You look for the meeting point between the ends only. The lines go on beyond them.")
-def between_the_ends(a, b, c, d):
-    point = meet(a, b, c, d)
-    inside = [((point - p) @ (q - p)) / ((q - p) @ (q - p)) for p, q in ((a, b), (c, d))]
-    return point if np.isfinite(point).all() and min(inside) >= 0 and max(inside) <= 1 else NOWHERE
-
-
-@MEET.wrong("Row and column have changed places in your answer: u, the column, comes first.")
-def row_first(a, b, c, d):
-    return meet(a, b, c, d)[::-1]
+@MEET.wrong("Your lines run through a, d and through b, c. The first runs through a and b.")
+def lines_crosswise(a, b, c, d):
+    return meet(a, d, b, c)
 
 
 # 2: the focal length --------------------------------------------------------------------------------------------------
@@ -194,13 +147,6 @@ def by_pythagoras(first, second, centre):
     return np.where(half > 0, np.sqrt(np.abs(half)), np.nan)
 
 
-@FOCAL_LENGTH.right
-def column_and_row(first, second, centre):
-    (u, v), (s, t) = (np.moveaxis(x - centre, -1, 0) for x in (first, second))
-    product = np.asarray(-u * s - v * t)
-    return np.sqrt(np.where(product <= 0, np.nan, product)).tolist()
-
-
 @FOCAL_LENGTH.wrong("This is f². Take the root.")
 def squared(first, second, centre):
     product = -np.sum((first - centre) * (second - centre), axis=-1)
@@ -212,59 +158,22 @@ def from_the_corner(first, second, centre):
     return focal_length(first, second, 0 * centre)
 
 
-@FOCAL_LENGTH.wrong(
-    "You take the size of the product. Where it is positive the two directions are at no right angle, and no focal "
-    "length fits: answer NaN."
-)
-def size_of_the_product(first, second, centre):
-    return np.sqrt(np.abs(np.sum((first - centre) * (second - centre), axis=-1)))
-
-
-@FOCAL_LENGTH.wrong("Where the product is positive, you answer 0. No focal length fits there: answer NaN.")
-def held_at_zero(first, second, centre):
-    return np.sqrt(np.maximum(-np.sum((first - centre) * (second - centre), axis=-1), 0))
-
-
-@FOCAL_LENGTH.wrong(
-    "You multiply the distances of both points. Their arrows matter, too: take the product of the vectors."
-)
+@FOCAL_LENGTH.wrong("You multiply the distances of both points. Take the dot product of their arrows.")
 def product_of_distances(first, second, centre):
     product = np.linalg.norm(first - centre, axis=-1) * np.linalg.norm(second - centre, axis=-1)
     return np.sqrt(np.where(np.sum((first - centre) * (second - centre), axis=-1) < 0, product, np.nan))
 
 
-@FOCAL_LENGTH.wrong(
-    "You use the columns alone. A tilted camera has both points off the middle row, and rows count, too."
-)
+@FOCAL_LENGTH.wrong("You use the columns alone. In a tilted picture the rows count, too.")
 def columns_alone(first, second, centre):
     product = -(first - centre)[..., 0] * (second - centre)[..., 0]
     return np.sqrt(np.where(product > 0, product, np.nan))
 
 
-@FOCAL_LENGTH.wrong("This is half the distance of the points: right only in a level picture of walls both seen at 45°.")
+@FOCAL_LENGTH.wrong("This is half the points' distance: right only in a level picture of walls both seen at 45°.")
 def half_the_distance(first, second, centre):
     half = np.linalg.norm(first - second, axis=-1) / 2
     return np.where(np.sum((first - centre) * (second - centre), axis=-1) < 0, half, np.nan)
-
-
-@FOCAL_LENGTH.wrong("You sum over all points. Each pair has a focal length of its own: sum over the last axis.")
-def summed_over_all(first, second, centre):
-    product = -np.sum((first - centre) * (second - centre))
-    return np.sqrt(product) if product > 0 else np.nan
-
-
-@FOCAL_LENGTH.wrong("The sign is missing below the root: the product of the arrows is −f².")
-def without_the_sign(first, second, centre):
-    product = np.sum((first - centre) * (second - centre), axis=-1)
-    return np.sqrt(np.where(product > 0, product, np.nan))
-
-
-@FOCAL_LENGTH.wrong(
-    "You take the mean of the two distances. The right angle at the eye asks for the root of a product."
-)
-def mean_of_distances(first, second, centre):
-    mean = (np.linalg.norm(first - centre, axis=-1) + np.linalg.norm(second - centre, axis=-1)) / 2
-    return np.where(np.sum((first - centre) * (second - centre), axis=-1) < 0, mean, np.nan)
 
 
 # 3: a height from another ---------------------------------------------------------------------------------------------
@@ -314,18 +223,6 @@ HEIGHT = Exercise(
 
 
 @HEIGHT.right
-def camera_height_first(foot, top, horizon, door_foot, door_top, door_height):
-    eye = door_height * (door_foot - horizon) / (door_foot - door_top)
-    return eye * (foot - top) / (foot - horizon)
-
-
-@HEIGHT.right
-def by_the_scale_at_the_foot(foot, top, horizon, door_foot, door_top, door_height):
-    metres_a_row = door_height / (door_foot - door_top)
-    return (foot - top) * metres_a_row * ((door_foot - horizon) / (foot - horizon))
-
-
-@HEIGHT.right
 def less_what_is_above_the_horizon(foot, top, horizon, door_foot, door_top, door_height):
     eye = door_height / (1 + (horizon - door_top) / (door_foot - horizon))
     return (eye + eye * (horizon - top) / (foot - horizon)).tolist()
@@ -342,40 +239,14 @@ def top_from_the_horizon(foot, top, horizon, door_foot, door_top, door_height):
     return eye * (horizon - top) / (foot - horizon)
 
 
-@HEIGHT.wrong(
-    "The horizon stands at the door's height in yours. It is as high as the *camera*: measure the door by it first."
-)
+@HEIGHT.wrong("Your horizon is at the door's height. It is as high as the *camera*: measure the door by it first.")
 def horizon_at_the_doors_height(foot, top, horizon, door_foot, door_top, door_height):
     return door_height * (foot - top) / (foot - horizon)
 
 
-@HEIGHT.wrong("You compare the feet's rows from the top of the picture. Measure them from the horizon.")
-def feet_from_the_border(foot, top, horizon, door_foot, door_top, door_height):
-    return door_height * (foot - top) / (door_foot - door_top) * door_foot / foot
-
-
-@HEIGHT.wrong(
-    "You divide by the rows from the *top* to the horizon. The *foot* stands on the ground, which gives the scale."
-)
-def scale_at_the_tops(foot, top, horizon, door_foot, door_top, door_height):
-    return door_height * (foot - top) / (door_foot - door_top) * (door_top - horizon) / (top - horizon)
-
-
-@HEIGHT.wrong("This is the height in camera heights. Bring in the door, whose height in metres is known.")
+@HEIGHT.wrong("This is the height in camera heights. Use the door, whose height in metres is known.")
 def in_camera_heights(foot, top, horizon, door_foot, door_top, door_height):
     return (foot - top) / (foot - horizon) + 0 * door_height
-
-
-@HEIGHT.wrong("This is the camera's height, which the horizon shows. The staff is another share of it.")
-def the_camera_s_height(foot, top, horizon, door_foot, door_top, door_height):
-    return door_height * (door_foot - horizon) / (door_foot - door_top) + 0 * foot
-
-
-@HEIGHT.wrong(
-    "You compare the square of the distances. One row is so many metres in proportion to the distance itself."
-)
-def by_squares(foot, top, horizon, door_foot, door_top, door_height):
-    return door_height * (foot - top) / (door_foot - door_top) * ((door_foot - horizon) / (foot - horizon)) ** 2
 
 
 # 4: a height in a tilted picture --------------------------------------------------------------------------------------
@@ -439,45 +310,22 @@ def by_distances_along_the_line(foot, top, door_foot, door_top, door_height, hor
     return door_height * share(foot, top) / share(door_foot, door_top)
 
 
-@ANY_HEIGHT.right
-def by_the_cross_ratio(foot, top, door_foot, door_top, door_height, horizon, vertical):
-    def share(b, t):
-        b, t = np.array([*b, 1.0]), np.array([*t, 1.0])
-        level = np.cross(np.cross(b, t), horizon)  # where the upright line crosses the horizon
-        v = None if abs(vertical[2]) < 1e-12 * np.abs(vertical).max() else vertical[:2] / vertical[2]
-        h = level[:2] / level[2]
-        along = lambda p: (p - b[:2]) @ (h - b[:2])  # noqa: E731
-        ratio = along(t[:2]) / along(h)
-        return ratio if v is None else ratio * (along(v) - along(h)) / (along(v) - along(t[:2]))
-
-    return door_height * share(foot, top) / share(door_foot, door_top)
-
-
-@ANY_HEIGHT.wrong("The point of the upright lines is left out. Then it is right only where they do not meet.")
+@ANY_HEIGHT.wrong("You leave out the vanishing point of upright lines. That is right only where they do not meet.")
 def without_the_vertical(foot, top, door_foot, door_top, door_height, horizon, vertical):
     return _measured(door_height, (foot, top), (door_foot, door_top), lambda b, t: _cross(b, t) / (horizon @ b))
 
 
-@ANY_HEIGHT.wrong("The horizon is left out: then a thing far away comes out shorter.")
+@ANY_HEIGHT.wrong("You leave out the horizon: then a thing far away comes out shorter.")
 def without_the_horizon(foot, top, door_foot, door_top, door_height, horizon, vertical):
     return _measured(door_height, (foot, top), (door_foot, door_top), lambda b, t: _cross(b, t) / _cross(vertical, t))
 
 
-@ANY_HEIGHT.wrong("You multiply the horizon by the top. The *foot* stands on the ground, whose horizon it is.")
-def horizon_times_top(foot, top, door_foot, door_top, door_height, horizon, vertical):
-    rule = lambda b, t: _cross(b, t) / ((horizon @ t) * _cross(vertical, t))  # noqa: E731
-    return _measured(door_height, (foot, top), (door_foot, door_top), rule)
-
-
-@ANY_HEIGHT.wrong("You cross the upright point with the foot. It is the *top* that stands there in the equation.")
+@ANY_HEIGHT.wrong("You cross the upright point with the foot. The equation has the *top* there.")
 def vertical_by_the_foot(foot, top, door_foot, door_top, door_height, horizon, vertical):
-    rule = lambda b, t: _cross(b, t) / ((horizon @ b) * _cross(vertical, b))  # noqa: E731
-    return _measured(door_height, (foot, top), (door_foot, door_top), rule)
+    def measure(b, t):
+        return _cross(b, t) / ((horizon @ b) * _cross(vertical, b))
 
-
-@ANY_HEIGHT.wrong("Thing and door are upside down: the thing's share stands above the line.")
-def door_over_thing(foot, top, door_foot, door_top, door_height, horizon, vertical):
-    return door_height**2 / any_height(foot, top, door_foot, door_top, door_height, horizon, vertical)
+    return _measured(door_height, (foot, top), (door_foot, door_top), measure)
 
 
 @ANY_HEIGHT.wrong("This is one measure alone, and its factor is unknown. Divide it by that of the door.")
@@ -486,22 +334,11 @@ def not_by_the_door(foot, top, door_foot, door_top, door_height, horizon, vertic
     return _cross(b, t) / ((horizon @ b) * _cross(vertical, t))
 
 
-@ANY_HEIGHT.wrong("This is the share of the door's height. Multiply by the door's height in metres.")
-def in_doors(foot, top, door_foot, door_top, door_height, horizon, vertical):
-    return any_height(foot, top, door_foot, door_top, 1.0, horizon, vertical)
-
-
 @ANY_HEIGHT.wrong("This is exercise 3's rule, by rows. It holds for a level camera only.")
 def by_rows(foot, top, door_foot, door_top, door_height, horizon, vertical):
     a, b, c = horizon
     row = -(a * foot[0] + c) / b
     return height(foot[1], top[1], row, door_foot[1], door_top[1], door_height)
-
-
-@ANY_HEIGHT.wrong("You multiply by (l · b) |v × t|. It stands below the line.")
-def multiplied(foot, top, door_foot, door_top, door_height, horizon, vertical):
-    rule = lambda b, t: _cross(b, t) * (horizon @ b) * _cross(vertical, t)  # noqa: E731
-    return _measured(door_height, (foot, top), (door_foot, door_top), rule)
 
 
 def _cross(one, other):
@@ -542,22 +379,14 @@ PRINCIPAL_POINT = Exercise(
     cases=_triangles,
     tolerance=1e-7,
     hints=(
-        "The line from one corner through c stands at a right angle on the side opposite. Two such lines fix c.",
-        "(q1 − c) · (q2 − q3) = 0 says (q2 − q3) · c = (q2 − q3) · q1. A second corner gives a second row. Solve both.",
+        "The line from one corner through the principal point stands at a right angle on the side opposite. Two such "
+        "lines fix it.",
+        "(q1 − c) · (q2 − q3) = 0 says (q2 − q3) · c = (q2 − q3) · q1. A second corner gives a second row: solve both "
+        "for c.",
         "`return np.linalg.solve(sides, [(q2 - q3) @ q1, ___])`, where `sides` has the rows q2 − q3 and q3 − q1",
     ),
     praise="It is the orthocentre: there the three altitudes of the triangle meet.",
 )
-
-
-@PRINCIPAL_POINT.right
-def by_crossing_two_altitudes(q1, q2, q3):
-    def upright(corner, one, other):
-        along = one - other
-        return np.array([along[0], along[1], -(along @ corner)])
-
-    x, y, w = np.cross(upright(q1, q2, q3), upright(q2, q3, q1))
-    return np.array([x / w, y / w])
 
 
 @PRINCIPAL_POINT.right
@@ -566,32 +395,15 @@ def by_least_squares_of_three(q1, q2, q3):
     return np.linalg.lstsq(sides, np.sum(sides * [q1, q2, q3], axis=1), rcond=None)[0].tolist()
 
 
-@PRINCIPAL_POINT.right
-def by_the_circumcentre(q1, q2, q3):
-    A = 2 * np.array([q2 - q1, q3 - q1])
-    middle = np.linalg.solve(A, [q2 @ q2 - q1 @ q1, q3 @ q3 - q1 @ q1])
-    return q1 + q2 + q3 - 2 * middle
-
-
 @PRINCIPAL_POINT.wrong("This is the mean of the three corners. The principal point is where the *altitudes* meet.")
 def centroid(q1, q2, q3):
     return (q1 + q2 + q3) / 3
 
 
-@PRINCIPAL_POINT.wrong(
-    "This is the middle of the circle through the corners. The principal point is where the altitudes meet."
-)
+@PRINCIPAL_POINT.wrong("This is the centre of the corners' circle. The altitudes meet in the principal point.")
 def circumcentre(q1, q2, q3):
     A = 2 * np.array([q2 - q1, q3 - q1])
     return np.linalg.solve(A, [q2 @ q2 - q1 @ q1, q3 @ q3 - q1 @ q1])
-
-
-@PRINCIPAL_POINT.wrong(
-    "This is the middle of the circle inside the triangle, where the angles' halves meet. Take the altitudes."
-)
-def incentre(q1, q2, q3):
-    sides = np.array([np.linalg.norm(q2 - q3), np.linalg.norm(q3 - q1), np.linalg.norm(q1 - q2)])
-    return sides @ np.array([q1, q2, q3]) / sides.sum()
 
 
 @PRINCIPAL_POINT.wrong("Your second row belongs to the wrong corner: q3 − q1 is opposite q2.")
@@ -599,25 +411,9 @@ def wrong_corner(q1, q2, q3):
     return np.linalg.solve(np.array([q2 - q3, q3 - q1]), [(q2 - q3) @ q1, (q3 - q1) @ q3])
 
 
-@PRINCIPAL_POINT.wrong("You use the side that begins at the corner. The altitude stands on the side *opposite*.")
-def adjacent_side(q1, q2, q3):
-    return np.linalg.solve(np.array([q1 - q2, q2 - q3]), [(q1 - q2) @ q1, (q2 - q3) @ q2])
-
-
-@PRINCIPAL_POINT.wrong("Below the right sides stands one corner twice. Each altitude has a corner of its own.")
+@PRINCIPAL_POINT.wrong("Your right sides use one corner twice. Each altitude has a corner of its own.")
 def one_corner_twice(q1, q2, q3):
     return np.linalg.solve(np.array([q2 - q3, q3 - q1]), [(q2 - q3) @ q1, (q3 - q1) @ q1])
-
-
-@PRINCIPAL_POINT.wrong("This is the foot of one altitude, on the side opposite q1. The altitudes meet farther on.")
-def foot_of_an_altitude(q1, q2, q3):
-    along = q3 - q2
-    return q2 + along * ((q1 - q2) @ along) / (along @ along)
-
-
-@PRINCIPAL_POINT.wrong("This is the middle of one side. The principal point lies on the altitudes of the triangle.")
-def middle_of_a_side(q1, q2, q3):
-    return (q1 + q2) / 2
 
 
 # 6: the camera from points --------------------------------------------------------------------------------------------
@@ -690,18 +486,6 @@ CAMERA_MATRIX = Exercise(
 
 
 @CAMERA_MATRIX.right
-def by_the_smallest_eigenvalue(points, pixels):
-    X = np.column_stack([points, np.ones(len(points))])
-    X = X / np.linalg.norm(X)
-    centre, size = pixels.mean(axis=0), pixels.std()
-    (u, v) = ((pixels - centre) / size).T
-    nothing = np.zeros_like(X)
-    A = np.block([[X, nothing, -u[:, None] * X], [nothing, X, -v[:, None] * X]])
-    P = np.linalg.svd(A)[2][-1].reshape(3, 4)
-    return np.array([[size, 0, centre[0]], [0, size, centre[1]], [0, 0, 1]]) @ P
-
-
-@CAMERA_MATRIX.right
 def rows_of_ones_less(points, pixels):
     A = []
     for (x, y, z), (u, v) in zip(points.tolist(), pixels.tolist(), strict=True):
@@ -711,33 +495,21 @@ def rows_of_ones_less(points, pixels):
     return np.append(found, 1).reshape(3, 4)
 
 
-def _solved(rows, which=-1):
-    return np.linalg.svd(np.array(rows, dtype=float))[2][which].reshape(3, 4)
+def _singular_vectors(points, pixels, sign=-1):
+    """Vᵀ (12, 12) of the rows (X, 0, −uX) and (0, X, −vX)."""
+    X = np.column_stack([points, np.ones(len(points))])
+    u, v = pixels[:, :1], pixels[:, 1:]
+    return np.linalg.svd(np.block([[X, 0 * X, sign * u * X], [0 * X, X, sign * v * X]]))[2]
 
 
-def _stacked(points, pixels, first, second):
-    return [row(np.array([*X, 1]), u, v) for X, (u, v) in zip(points, pixels, strict=True) for row in (first, second)]
-
-
-_O = np.zeros(4)
-
-
-@CAMERA_MATRIX.wrong("The last number of each point is missing a sign: the rows are (X, 0, −uX) and (0, X, −vX).")
+@CAMERA_MATRIX.wrong("A sign is wrong in the last four numbers: the rows are (X, 0, −uX) and (0, X, −vX).")
 def plus_u(points, pixels):
-    return _solved(_stacked(points, pixels, lambda X, u, v: [*X, *_O, *(u * X)], lambda X, u, v: [*_O, *X, *(v * X)]))
+    return _singular_vectors(points, pixels, 1)[-1].reshape(3, 4)
 
 
-@CAMERA_MATRIX.wrong(
-    "You swapped u and v: u belongs to the row that begins with X, v to the one that begins with zeros."
-)
+@CAMERA_MATRIX.wrong("You swapped u and v: u is in the row that begins with X, v in the other.")
 def swapped(points, pixels):
     return camera_matrix(points, pixels[:, ::-1])
-
-
-@CAMERA_MATRIX.wrong("This is the singular vector of the *greatest* value. The rows send the last one to 0.")
-def greatest(points, pixels):
-    rows = _stacked(points, pixels, lambda X, u, v: [*X, *_O, *(-u * X)], lambda X, u, v: [*_O, *X, *(-v * X)])
-    return _solved(rows, 0)
 
 
 @CAMERA_MATRIX.wrong("You filled P column by column. Its first four numbers are its first *row*.")
@@ -745,29 +517,9 @@ def by_columns(points, pixels):
     return camera_matrix(points, pixels).reshape(4, 3).T
 
 
-@CAMERA_MATRIX.wrong("`np.linalg.svd` gives V already transposed: its last *row* is wanted, not its last column.")
+@CAMERA_MATRIX.wrong("`np.linalg.svd` gives V already transposed: take its last *row*, not its last column.")
 def last_column(points, pixels):
-    rows = _stacked(points, pixels, lambda X, u, v: [*X, *_O, *(-u * X)], lambda X, u, v: [*_O, *X, *(-v * X)])
-    return np.linalg.svd(np.array(rows))[2][:, -1].reshape(3, 4)
-
-
-@CAMERA_MATRIX.wrong("Your second rows repeat the first ones. They begin with zeros, and have v.")
-def first_rows_twice(points, pixels):
-    return _solved(_stacked(points, pixels, lambda X, u, v: [*X, *_O, *(-u * X)], lambda X, u, v: [*X, *_O, *(-v * X)]))
-
-
-@CAMERA_MATRIX.wrong("Your points have 0 for their fourth number, so that the camera's place drops out. It is 1.")
-def fourth_number_zero(points, pixels):
-    rows = []
-    for place, (u, v) in zip(points, pixels, strict=True):
-        X, Y = np.array([*place, 0]), np.array([*place, 1])
-        rows += [[*X, *_O, *(-u * Y)], [*_O, *X, *(-v * Y)]]
-    return _solved(rows)
-
-
-@CAMERA_MATRIX.wrong("You use the first five points only. Ten equations do not fix eleven numbers.")
-def five_points(points, pixels):
-    return camera_matrix(points[:5], pixels[:5])
+    return _singular_vectors(points, pixels)[:, -1].reshape(3, 4)
 
 
 EXERCISES = (MEET, FOCAL_LENGTH, HEIGHT, ANY_HEIGHT, PRINCIPAL_POINT, CAMERA_MATRIX)

@@ -58,35 +58,15 @@ CARRY = Exercise(
 
 
 @CARRY.right
-def column_by_column(H, uv):
-    u, v = uv[..., 0], uv[..., 1]
-    w = H[2, 0] * u + H[2, 1] * v + H[2, 2]
-    x, y = H[0, 0] * u + H[0, 1] * v + H[0, 2], H[1, 0] * u + H[1, 1] * v + H[1, 2]
-    return np.stack([x / w, y / w], axis=-1)
-
-
-@CARRY.right
 def as_opencv_carries(H, uv):
     import cv2
 
     return cv2.perspectiveTransform(np.reshape(uv, (-1, 1, 2)), H).reshape(np.shape(uv))
 
 
-@CARRY.right
-def by_einsum(H, uv):
-    x = np.einsum("ij,...j->...i", H, np.insert(uv, 2, 1, axis=-1))
-    return x[..., :2] / x[..., 2:3]
-
-
-@CARRY.wrong("You do not divide at all. H gives three numbers, and the pixel is the first two divided by the third.")
+@CARRY.wrong("You do not divide at all. H gives three numbers: divide the first two by the third.")
 def not_divided(H, uv):
     return (np.insert(uv, 2, 1.0, axis=-1) @ H.T)[..., :2]
-
-
-@CARRY.wrong("You multiply by the third number. The pixel is the first two numbers *divided* by it.")
-def multiplied(H, uv):
-    x = np.insert(uv, 2, 1.0, axis=-1) @ H.T
-    return x[..., :2] * x[..., 2:]
 
 
 @CARRY.wrong("Points are rows here, so H x becomes `x @ H.T`. Yours is `x @ H`.")
@@ -106,28 +86,10 @@ def divided_by_the_length(H, uv):
     return x[..., :2] / np.linalg.norm(x, axis=-1, keepdims=True)
 
 
-@CARRY.wrong("You divide by the *size* of the third number. Its sign belongs to it: −H is the same homography as H.")
+@CARRY.wrong("You divide by the *size* of the third number. Keep its sign: −H is the same homography as H.")
 def divided_by_the_size(H, uv):
     x = np.insert(uv, 2, 1.0, axis=-1) @ H.T
     return x[..., :2] / np.abs(x[..., 2:])
-
-
-@CARRY.wrong("You put 0 behind u and v. Then the last column of H has no effect; a pixel takes a 1 there.")
-def with_a_zero(H, uv):
-    x = np.insert(uv, 2, 0.0, axis=-1) @ H.T
-    return x[..., :2] / x[..., 2:]
-
-
-@CARRY.wrong("You put the 1 before u and v. It belongs behind them: (u, v, 1).")
-def one_before(H, uv):
-    x = np.insert(uv, 0, 1.0, axis=-1) @ H.T
-    return x[..., :2] / x[..., 2:]
-
-
-@CARRY.wrong("You divide by the mean of the third numbers. Each pixel has its own.")
-def one_divisor_for_all(H, uv):
-    x = np.insert(uv, 2, 1.0, axis=-1) @ H.T
-    return x[..., :2] / np.mean(x[..., 2])
 
 
 # 2: a homography from matches ----------------------------------------------------------------------------------------
@@ -135,11 +97,15 @@ def one_divisor_for_all(H, uv):
 
 def homography(uv: Array, to: Array) -> Array:
     """H (3, 3) with H[2, 2] = 1 that takes pixels (n, 2) to others (n, 2), for n of 4 and more."""
+    H = _singular_vectors(uv, to)[-1].reshape(3, 3)
+    return H / H[2, 2]
+
+
+def _singular_vectors(uv: Array, to: Array) -> Array:
+    """Vᵀ (9, 9) of the rows (x, 0, −u x) and (0, x, −v x)."""
     x = np.column_stack([uv, np.ones(len(uv))])
     u, v = to[:, :1], to[:, 1:]
-    A = np.block([[x, 0 * x, -u * x], [0 * x, x, -v * x]])
-    H = np.linalg.svd(A)[2][-1].reshape(3, 3)
-    return H / H[2, 2]
+    return np.linalg.svd(np.block([[x, 0 * x, -u * x], [0 * x, x, -v * x]]))[2]
 
 
 def _matched(rng: np.random.Generator) -> Iterator[Arguments]:
@@ -190,13 +156,6 @@ HOMOGRAPHY = Exercise(
 
 
 @HOMOGRAPHY.right
-def by_camviz(uv, to):
-    from camviz import twoview
-
-    return twoview.homography(uv, to)
-
-
-@HOMOGRAPHY.right
 def by_opencv(uv, to):
     import cv2
 
@@ -208,15 +167,6 @@ def with_the_last_number_fixed(uv, to):
     x, zero = np.column_stack([uv, np.ones(len(uv))]), np.zeros((len(uv), 3))
     rows = np.concatenate([np.hstack([x, zero, -to[:, :1] * uv]), np.hstack([zero, x, -to[:, 1:] * uv])])
     return np.append(np.linalg.lstsq(rows, to.T.ravel(), rcond=None)[0], 1.0).reshape(3, 3)
-
-
-@HOMOGRAPHY.right
-def row_by_row(uv, to):
-    A = []
-    for (a, b), (u, v) in zip(uv, to, strict=True):
-        A += [[a, b, 1, 0, 0, 0, -u * a, -u * b, -u], [0, 0, 0, a, b, 1, -v * a, -v * b, -v]]
-    H = np.linalg.svd(np.array(A))[2][8].reshape(3, 3)
-    return H / H[2, 2]
 
 
 @HOMOGRAPHY.convention(
@@ -232,64 +182,27 @@ def the_inverse(uv, to):
     return homography(to, uv)
 
 
-@HOMOGRAPHY.wrong("You take the first row of Vᵀ, which makes A h *largest*. The last row makes it least.")
-def first_singular_vector(uv, to):
-    x = np.column_stack([uv, np.ones(len(uv))])
-    A = np.block([[x, 0 * x, -to[:, :1] * x], [0 * x, x, -to[:, 1:] * x]])
-    H = np.linalg.svd(A)[2][0].reshape(3, 3)
-    return H / H[2, 2]
-
-
-@HOMOGRAPHY.wrong("You take the last *column* of Vᵀ. `np.linalg.svd` gives Vᵀ, whose rows are the singular vectors.")
+@HOMOGRAPHY.wrong("You take the last *column* of Vᵀ. `np.linalg.svd` gives Vᵀ: its rows are the singular vectors.")
 def last_column(uv, to):
-    x = np.column_stack([uv, np.ones(len(uv))])
-    A = np.block([[x, 0 * x, -to[:, :1] * x], [0 * x, x, -to[:, 1:] * x]])
-    H = np.linalg.svd(A)[2][:, -1].reshape(3, 3)
+    H = _singular_vectors(uv, to)[:, -1].reshape(3, 3)
     return H / H[2, 2]
 
 
-@HOMOGRAPHY.wrong(
-    "The nine numbers are stored by columns in yours. `reshape(3, 3)` without a transpose has them by rows."
-)
-def by_columns(uv, to):
-    return homography(uv, to).T
-
-
-@HOMOGRAPHY.wrong("The sign before u x and v x is turned round. From u (h₃ · x) = h₁ · x the row is (x, 0, −u x).")
+@HOMOGRAPHY.wrong("The signs of u x and v x are wrong. From u (h₃ · x) = h₁ · x the row is (x, 0, −u x).")
 def signs_turned_round(uv, to):
-    x = np.column_stack([uv, np.ones(len(uv))])
-    A = np.block([[x, 0 * x, to[:, :1] * x], [0 * x, x, to[:, 1:] * x]])
-    H = np.linalg.svd(A)[2][-1].reshape(3, 3)
+    H = _singular_vectors(uv, -to)[-1].reshape(3, 3)
     return H / H[2, 2]
 
 
-@HOMOGRAPHY.wrong("You have changed u and v of the target: the first row belongs to u, the second one to v.")
+@HOMOGRAPHY.wrong("You exchanged u and v of the target: the first row belongs to u, the second one to v.")
 def u_and_v_changed(uv, to):
     return homography(uv, to[:, ::-1])
 
 
-@HOMOGRAPHY.wrong(
-    "This is the best *affine* map: its last row is (0, 0, 1), and parallel lines stay parallel. A turned camera needs "
-    "all three numbers of the last row."
-)
+@HOMOGRAPHY.wrong("This is the best *affine* map: it keeps parallel lines. A turned camera needs H's whole last row.")
 def affine(uv, to):
     x = np.column_stack([uv, np.ones(len(uv))])
     return np.vstack([np.linalg.lstsq(x, to, rcond=None)[0].T, [0, 0, 1]])
-
-
-@HOMOGRAPHY.wrong("This is a mere shift, the mean of all differences. The pictures of a turned camera also stretch.")
-def a_shift(uv, to):
-    H = np.eye(3)
-    H[:2, 2] = (to - uv).mean(axis=0)
-    return H
-
-
-@HOMOGRAPHY.wrong("You take the second-to-last singular vector. The least singular value is the last one.")
-def second_to_last(uv, to):
-    x = np.column_stack([uv, np.ones(len(uv))])
-    A = np.block([[x, 0 * x, -to[:, :1] * x], [0 * x, x, -to[:, 1:] * x]])
-    H = np.linalg.svd(A)[2][-2].reshape(3, 3)
-    return H / H[2, 2]
 
 
 # 3: how long the second step is --------------------------------------------------------------------------------------
@@ -339,27 +252,13 @@ def by_lstsq(points, R, direction, rays):
 
 
 @STEP.right
-def point_by_point(points, R, direction, rays):
-    above = below = 0.0
-    for X, r in zip(points, rays, strict=True):
-        a, b = np.cross(r, direction), np.cross(r, R @ X)
-        above, below = above - a @ b, below + a @ a
-    return above / below
-
-
-@STEP.right
 def across_each_ray(points, R, direction, rays):
     across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
     a, b = across @ direction, (across @ (points @ R.T)[..., None])[..., 0]
     return -(a * b).sum() / (a**2).sum()
 
 
-@STEP.wrong("The sign is flipped: from b + ℓ a = 0 follows ℓ = −b/a.")
-def sign_flipped(points, R, direction, rays):
-    return -second_step(points, R, direction, rays)
-
-
-@STEP.wrong("You did not turn the points. They are in the second camera's frame, and R brings them into the third's.")
+@STEP.wrong("You did not turn the points. R brings them from the second camera's frame into the third's.")
 def not_turned(points, R, direction, rays):
     return second_step(points, np.eye(3), direction, rays)
 
@@ -369,42 +268,16 @@ def turned_back(points, R, direction, rays):
     return second_step(points, R.T, direction, rays)
 
 
-@STEP.wrong("You turn the direction as well. It is already in the third camera's frame, as t of a motion always is.")
+@STEP.wrong("You turn the direction as well. It is in the third camera's frame already.")
 def direction_turned(points, R, direction, rays):
     return second_step(points, R, R @ direction, rays)
 
 
-@STEP.wrong(
-    "You average the answers of single points. A point in the direction of the step tells no length, and its answer is "
-    "0/0 or nonsense: let all points decide together."
-)
+@STEP.wrong("You average single answers. A point in the step's direction tells no length: sum over all first.")
 def mean_of_single_answers(points, R, direction, rays):
     a, b = np.cross(rays, direction), np.cross(rays, points @ R.T)
     with np.errstate(all="ignore"):
         return -np.mean(np.sum(a * b, axis=-1) / np.sum(a * a, axis=-1))
-
-
-@STEP.wrong("You take the first point alone. Where the pixels have errors, all points together are better.")
-def first_point_alone(points, R, direction, rays):
-    return second_step(points[:1], R, direction, rays[:1])
-
-
-@STEP.wrong("You divide by the sum of b², where the sum of a² belongs: a stands before the unknown ℓ.")
-def divided_by_b(points, R, direction, rays):
-    a, b = np.cross(rays, direction), np.cross(rays, points @ R.T)
-    return -np.sum(a * b) / np.sum(b * b)
-
-
-@STEP.wrong("This is the ratio of lengths, which has no sign and counts every error as if it lay along a.")
-def ratio_of_lengths(points, R, direction, rays):
-    a, b = np.cross(rays, direction), np.cross(rays, points @ R.T)
-    return np.linalg.norm(b) / np.linalg.norm(a)
-
-
-@STEP.wrong("You divide the sum of a · b by the number of points. Least squares divides by the sum of a².")
-def divided_by_the_count(points, R, direction, rays):
-    a, b = np.cross(rays, direction), np.cross(rays, points @ R.T)
-    return -np.sum(a * b) / len(points)
 
 
 # 4: how many draws ----------------------------------------------------------------------------------------------------
@@ -444,14 +317,6 @@ def by_log1p(share, n, sure):
         return np.clip(np.ceil(np.log1p(-sure) / np.log1p(-np.power(share, n))), 1, None)
 
 
-@DRAWS.right
-def one_by_one(share, n, sure):
-    def single(w):
-        return 1.0 if w == 1 else max(1.0, np.ceil(np.log2(1 - sure) / np.log2(1 - w**n)))
-
-    return np.vectorize(single, otypes=[float])(share)
-
-
 @DRAWS.wrong("A number of draws is a whole one: round up.")
 def not_rounded(share, n, sure):
     with np.errstate(divide="ignore"):
@@ -464,19 +329,13 @@ def rounded_to_the_nearest(share, n, sure):
         return np.maximum(np.round(np.log(1 - sure) / np.log(1 - share**n)), 1)
 
 
-@DRAWS.wrong("You round down, and so it is a draw too few.")
-def rounded_down(share, n, sure):
-    with np.errstate(divide="ignore"):
-        return np.maximum(np.floor(np.log(1 - sure) / np.log(1 - share**n)), 1)
-
-
-@DRAWS.wrong("Where all matches are right, yours asks for no draw at all. One is needed to have an answer.")
+@DRAWS.wrong("Where all matches are right, yours asks for no draw at all. At least one is needed.")
 def none_where_all_are_right(share, n, sure):
     with np.errstate(divide="ignore"):
         return np.abs(np.ceil(np.log(1 - sure) / np.log(1 - share**n)))
 
 
-@DRAWS.wrong("This is how many draws it takes *on average* until one is good. Here it is to be nearly sure.")
+@DRAWS.wrong("This is how many draws it takes *on average* until one is good. Here it must be nearly sure.")
 def on_average(share, n, sure):
     return np.ceil(1 / share**n)
 
@@ -485,18 +344,6 @@ def on_average(share, n, sure):
 def one_right_is_enough(share, n, sure):
     with np.errstate(divide="ignore"):
         return np.maximum(np.ceil(np.log(1 - sure) / np.log((1 - share) ** n)), 1)
-
-
-@DRAWS.wrong("You take `sure` for the probability that all draws are spoilt. That is 1 − `sure`.")
-def sure_of_the_wrong_thing(share, n, sure):
-    with np.errstate(divide="ignore"):
-        return np.maximum(np.ceil(np.log(sure) / np.log(1 - share**n)), 1)
-
-
-@DRAWS.wrong("You take wⁿ for the probability that a draw is *spoilt*. It is that of a good one: 1 − wⁿ.")
-def spoilt_for_good(share, n, sure):
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.maximum(np.ceil(np.log(1 - sure) / np.log(share**n)), 1)
 
 
 @DRAWS.wrong("The n is missing: a draw has n matches, and all of them must be right.")
@@ -540,26 +387,11 @@ RESIDUALS = Exercise(
 
 
 @RESIDUALS.right
-def camera_by_camera(turns, steps, points, seen, K):
-    found = []
-    for turn, t, uv in zip(turns, steps, seen, strict=True):
-        x = (Rotation.from_rotvec(turn).apply(points) + t) @ K.T
-        found.append(uv - x[:, :2] / x[:, 2:])
-    return np.array(found)
-
-
-@RESIDUALS.right
 def by_opencv_for_each_camera(turns, steps, points, seen, K):
     import cv2
 
     each = [cv2.projectPoints(points, turn, t, K, None)[0][:, 0] for turn, t in zip(turns, steps, strict=True)]
     return seen - np.array(each)
-
-
-@RESIDUALS.right
-def by_einsum_over_all(turns, steps, points, seen, K):
-    x = np.einsum("mij,nj->mni", K @ Rotation.from_rotvec(turns).as_matrix(), points) + (steps @ K.T)[:, None]
-    return seen - x[..., :2] / x[..., 2:]
 
 
 def _changed(turns, steps, points, seen, K, *, back=False, centre=False, flat=True, divide=True):
@@ -571,7 +403,7 @@ def _changed(turns, steps, points, seen, K, *, back=False, centre=False, flat=Tr
     return seen - (x[..., :2] / x[..., 2:] if divide else x[..., :2])
 
 
-@RESIDUALS.wrong("The sign is reversed. A residual is where the point was seen, *less* where the camera projects it.")
+@RESIDUALS.wrong("The sign is reversed. A residual is where the point was detected, *less* where it is projected.")
 def projected_less_seen(turns, steps, points, seen, K):
     return -residuals(turns, steps, points, seen, K)
 
@@ -596,29 +428,9 @@ def without_the_division(turns, steps, points, seen, K):
     return _changed(turns, steps, points, seen, K, divide=False)
 
 
-@RESIDUALS.wrong("This is where the cameras project the points. A residual is `seen` less that.")
-def projections_alone(turns, steps, points, seen, K):
-    return -residuals(turns, steps, points, 0 * seen, K)
-
-
-@RESIDUALS.wrong("These are the *sizes* of the residuals. The optimiser squares them by itself, and needs their signs.")
-def sizes_of_the_residuals(turns, steps, points, seen, K):
-    return np.abs(residuals(turns, steps, points, seen, K))
-
-
 @RESIDUALS.wrong("These are the squares. `least_squares` squares the residuals by itself.")
 def squares_of_the_residuals(turns, steps, points, seen, K):
     return residuals(turns, steps, points, seen, K) ** 2
-
-
-@RESIDUALS.wrong("You leave out t. Then all cameras stand in one place, and nothing tells the depths.")
-def without_the_steps(turns, steps, points, seen, K):
-    return residuals(turns, 0 * steps, points, seen, K)
-
-
-@RESIDUALS.wrong("You use the first camera's pose for all. Each camera has its own.")
-def first_camera_for_all(turns, steps, points, seen, K):
-    return residuals(turns * 0 + turns[:1], steps * 0 + steps[:1], points, seen, K)
 
 
 # 6: the similarity that is free --------------------------------------------------------------------------------------
@@ -678,53 +490,21 @@ def as_umeyama_writes_it(points, true):
     return np.array([c * R @ x + true.mean(0) - c * R @ points.mean(0) for x in points])
 
 
-@ALIGNED.right
-def by_scipy_s_rotation(points, true):
+def _moved(points, true, scale=lambda turned, b: np.sum(turned * b) / np.sum(turned**2), mirror=False):
     a, b = points - points.mean(axis=0), true - true.mean(axis=0)
-    turned = a @ _kabsch(a, b).T
-    return np.sum(turned * b) / np.sum(a * a) * turned + true.mean(axis=0)
+    U, _, Vt = np.linalg.svd(b.T @ a)
+    turned = a @ (U * [1, 1, 1 if mirror else np.linalg.det(U @ Vt)] @ Vt).T
+    return scale(turned, b) * turned + true.mean(axis=0)
 
 
-def _kabsch(a, b):
-    U, _, Vt = np.linalg.svd(a.T @ b)
-    return Vt.T @ np.diag([1, 1, np.sign(np.linalg.det(Vt.T @ U.T))]) @ U.T
-
-
-def _moved(points, true, scale=None, rotation=None):
-    a, b = points - points.mean(axis=0), true - true.mean(axis=0)
-    R = _kabsch(a, b) if rotation is None else rotation(a, b)
-    turned = a @ R.T
-    s = np.sum(turned * b) / np.sum(a * a) if scale is None else scale(turned, b)
-    return s * turned + true.mean(axis=0)
-
-
-@ALIGNED.wrong("The scale is left at 1. Pictures do not tell it, so it must be found as well.")
+@ALIGNED.wrong("You leave the scale at 1. Pictures do not tell it, so find it as well.")
 def without_scale(points, true):
     return _moved(points, true, scale=lambda a, b: 1.0)
 
 
-@ALIGNED.wrong("You did not turn the points. Where the first camera looked is free, too.")
-def without_rotation(points, true):
-    return _moved(points, true, rotation=lambda a, b: np.eye(3))
-
-
-@ALIGNED.wrong("You turn them the wrong way: this is the inverse of the rotation.")
-def rotation_turned_round(points, true):
-    return _moved(points, true, rotation=lambda a, b: _kabsch(a, b).T, scale=lambda a, b: _scale(points, true))
-
-
-def _scale(points, true):
-    a, b = points - points.mean(axis=0), true - true.mean(axis=0)
-    return np.sum((a @ _kabsch(a, b).T) * b) / np.sum(a * a)
-
-
-@ALIGNED.wrong("Yours may come out as a mirror image. Where det(U Vᵀ) is −1, the last singular value changes its sign.")
+@ALIGNED.wrong("Yours may be a mirror image. Where det(U Vᵀ) is −1, the last singular value changes its sign.")
 def mirror_image(points, true):
-    def rotation(a, b):
-        U, _, Vt = np.linalg.svd(b.T @ a)
-        return U @ Vt
-
-    return _moved(points, true, rotation=rotation)
+    return _moved(points, true, mirror=True)
 
 
 @ALIGNED.wrong("They are in the middle of the wrong cloud: add the middle of the *true* points at the end.")
@@ -732,32 +512,15 @@ def own_middle(points, true):
     return _moved(points, true) - true.mean(axis=0) + points.mean(axis=0)
 
 
-@ALIGNED.wrong("The middle is missing at the end: add that of the true points.")
-def without_middle(points, true):
-    return _moved(points, true) - true.mean(axis=0)
-
-
-@ALIGNED.wrong(
-    "Your scale is the ratio of the two sizes. With noise that is too large: the noise makes a cloud larger, and only "
-    "what agrees with the other one counts."
-)
+@ALIGNED.wrong("Your scale is the ratio of the two sizes. Noise makes a cloud larger: use only what agrees.")
 def ratio_of_sizes(points, true):
     return _moved(points, true, scale=lambda a, b: np.linalg.norm(b) / np.linalg.norm(a))
 
 
-@ALIGNED.wrong("Your scale is the inverse: it brings the true points to yours.")
-def inverse_scale(points, true):
-    return _moved(points, true, scale=lambda a, b: np.sum(a * a) / np.sum(a * b))
-
-
-@ALIGNED.wrong("You divide by the squares of the true points, where those of `points` belong: they are what is scaled.")
-def scale_of_the_others(points, true):
-    return _moved(points, true, scale=lambda a, b: np.sum(a * b) / np.sum(b * b))
-
-
-@ALIGNED.wrong("You answer the true points themselves. Only a move, a turn and a scale are allowed.")
-def the_true_points(points, true):
-    return true.copy()
+@ALIGNED.wrong("You did not turn the points. The clouds may be turned against each other, too.")
+def without_rotation(points, true):
+    a, b = points - points.mean(axis=0), true - true.mean(axis=0)
+    return np.sum(a * b) / np.sum(a * a) * a + true.mean(axis=0)
 
 
 EXERCISES = (CARRY, HOMOGRAPHY, STEP, DRAWS, RESIDUALS, ALIGNED)
