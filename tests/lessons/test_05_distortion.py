@@ -5,10 +5,10 @@ import re
 import cv2
 import numpy as np
 import pytest
-from mutants import function_of, solution_of
-from mutation import mutants
 from quoting import LESSONS
 from scipy.optimize import brentq
+from test_exercises import function_of, solution_of
+from test_mutants import mutants
 
 from camviz.scenes.wall import LAMP
 from camviz.views.distortion import DistortionView
@@ -107,7 +107,7 @@ def test_each_slip_of_the_pen_in_distort_changes_the_wall_in_each_mode(says, vie
     says("Choose undistorted, and your function straightens the wall.")
     exercise, view = exercises("05")["05.distort"], view_beside.but(show=show)
     right = shown_beside(view, function_of(exercise, solution_of(exercise)))
-    every = mutants(solution_of(exercise), "distort", exercise.parameters, [])
+    every = mutants(solution_of(exercise))
     made = [mutant for mutant in every if not UNSEEN.search(mutant.change)]
     assert len(made) >= 40
     alike = []
