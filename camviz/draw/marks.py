@@ -18,7 +18,7 @@ Style = Mapping[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class Lines:
     """Lines, each (n, 2); NaN interrupts a line. A closed one is an outline that is filled."""
 
     lines: tuple[Array, ...]
@@ -38,7 +38,7 @@ class Segments:
 
 
 @dataclass(frozen=True, eq=False)
-class Dots:
+class Discs:
     """Round dots at points (n, 2)."""
 
     points: Array
@@ -67,7 +67,7 @@ class Text:
 
 
 @dataclass(frozen=True, eq=False)
-class Rectangle:
+class Rect:
     """A rectangle, its corners rounded by `radius`."""
 
     x: float
@@ -122,7 +122,7 @@ class Inset:
     attributes: Mapping[str, Any] = field(default_factory=dict)
 
 
-Mark = Path | Segments | Dots | Text | Rectangle | Image | Group | Inset
+Mark = Lines | Segments | Discs | Text | Rect | Image | Group | Inset
 
 
 class Marks(tuple[Mark, ...]):
@@ -190,11 +190,11 @@ NOTHING = Marks()
 
 def _lines_of(mark: Mark) -> tuple[Array, ...]:
     match mark:
-        case Path():
+        case Lines():
             return mark.lines
         case Segments():
             return tuple(mark.ends)
-        case Dots():
+        case Discs():
             return (mark.points,)
     return ()
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from camviz.draw.marks import NOTHING, Dots, Group, Image, Marks, Path, Rectangle, Segments, Text, join
+from camviz.draw.marks import NOTHING, Discs, Group, Image, Lines, Marks, Rect, Segments, Text, join
 
 __all__ = [
     "NOTHING", "Marks", "dots", "group", "image", "join", "line", "paragraph", "path", "polygon", "rectangle",
@@ -21,7 +21,7 @@ __all__ = [
 def path(lines: Iterable[ArrayLike], class_: str, *, closed: bool = False, **style: Any) -> Marks:
     """One mark of all `lines`, each (n, 2); NaN interrupts a line."""
     arrays = tuple(np.asarray(line, dtype=float) for line in lines)
-    return Marks([Path(arrays, class_, closed, style)]) if any(_is_drawn(one) for one in arrays) else NOTHING
+    return Marks([Lines(arrays, class_, closed, style)]) if any(_is_drawn(one) for one in arrays) else NOTHING
 
 
 def line(points: ArrayLike, class_: str, **style: Any) -> Marks:
@@ -46,7 +46,7 @@ def dots(points: ArrayLike, class_: str, diameter: float = 5) -> Marks:
     """Round dots at points (n, 2), as one mark."""
     places = np.asarray(points, dtype=float).reshape(-1, 2)
     places = places[np.isfinite(places).all(axis=1)]
-    return Marks([Dots(places, class_, diameter)]) if len(places) else NOTHING
+    return Marks([Discs(places, class_, diameter)]) if len(places) else NOTHING
 
 
 def text(
@@ -74,7 +74,7 @@ def paragraph(point: ArrayLike, words: str, width: float, class_: str = "note") 
 def rectangle(
     x: float, y: float, width: float, height: float, class_: str, *, radius: float | None = None, **style: Any
 ) -> Marks:
-    return Marks([Rectangle(float(x), float(y), float(width), float(height), class_, radius, style)])
+    return Marks([Rect(float(x), float(y), float(width), float(height), class_, radius, style)])
 
 
 def image(
@@ -96,7 +96,7 @@ def handle(content: Marks, name: str, label: str) -> Marks:
     return group(content, data_drag=name, tabindex=0, role="group", aria_label=label)
 
 
-def disc(centre: ArrayLike, radius: float, class_: str, **style: Any) -> Marks:
+def circle(centre: ArrayLike, radius: float, class_: str, **style: Any) -> Marks:
     """A filled circle around a place (2,)."""
     turn = np.linspace(0, 2 * np.pi, 33)[:-1, None]
     return polygon(np.asarray(centre) + radius * np.hstack([np.cos(turn), np.sin(turn)]), class_, **style)

@@ -24,7 +24,7 @@ import cv2
 import numpy as np
 
 from camviz.draw import styles
-from camviz.draw.marks import Dots, Group, Image, Inset, Mark, Marks, Path, Rectangle, Segments, Style, Text
+from camviz.draw.marks import Discs, Group, Image, Inset, Lines, Mark, Marks, Rect, Segments, Style, Text
 
 _HARD_PIXELS_A_UNIT = 4  # that keep hard pixels hard when a program smooths them
 _SMOOTH_UNITS_A_PIXEL = 2  # beyond which smooth pictures get more pixels
@@ -48,14 +48,14 @@ class PageWriter:
         match mark:
             case Text():
                 return self._text(mark)
-            case Path():
+            case Lines():
                 return self._path("".join([_pieces(line, mark.closed) for line in mark.lines]), mark.class_, mark.style)
             case Segments():
                 return self._path(_segments(mark), mark.class_, mark.style)
-            case Dots():
+            case Discs():
                 data = "".join(map("M%.1f,%.1fh0".__mod__, map(tuple, mark.points.tolist())))
                 return self._path(data, f"{mark.class_} dots", {"stroke_width": mark.diameter})
-            case Rectangle(x, y, width, height):
+            case Rect(x, y, width, height):
                 look = self._look("rect", mark.class_, mark.style)
                 return element("rect", x=x, y=y, width=width, height=height, rx=mark.radius, **look)
             case Image():

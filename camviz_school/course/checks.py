@@ -1,4 +1,4 @@
-"""Exercise checking: a reader's function against a reference, on fresh random cases, answered in words.
+"""Exercise checking in words: long because each kind of mistake has its reply.
 
 A checker never raises for what a reader wrote, and never calls a stub, a constant or a function that only fits the
 numbers on the page correct. It knows numpy and nothing about cameras. It gives nothing away

@@ -1,4 +1,4 @@
-"""One call of a reader's function: what it was given, what it returned, printed, changed or raised.
+"""One call of a reader's function, long because so much can come of it: what it was given, returned, printed or raised.
 
 Nothing that the function does gets out of `run`; it all becomes a `Trial`, for `camviz_school.course.checks` to speak
 about.

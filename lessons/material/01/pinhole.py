@@ -17,7 +17,6 @@ from camviz import optics
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
 from camviz.draw.flow import Cell, Part, rows
-from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import axes, curve, logarithmic_grid, logs, plot_panel
@@ -215,7 +214,7 @@ class PinholeView(OrbitView):
             light += np.sqrt(np.maximum(light, 0) / WHITE_PHOTONS) * _grain(light.shape)
         return to_display(light)
 
-    def _picture_panel(self, cell: Cell) -> Marks:
+    def _picture_panel(self, cell: Cell) -> svg.Marks:
         panel, picture = self._image_panel("wall", cell)
         if self._has("yours"):
             lines = Camera(self.camera().intrinsics).project(self._outlines)
@@ -225,19 +224,19 @@ class PinholeView(OrbitView):
         size = f"{WALL_MM[0]:g} × {WALL_MM[1]:g} mm" if self._has("numbers") else ""
         return panel.show(picture + self._marks(panel), title=title, note=size)
 
-    def _image_panel(self, name: str, cell: Cell) -> tuple[Panel, Marks]:
+    def _image_panel(self, name: str, cell: Cell) -> tuple[Panel, svg.Marks]:
         """A panel of the picture in a tile, and the picture in it."""
         pixels = self.camera().intrinsics
         panel = image_in(cell, name, pixels.width, pixels.height)
         return panel, placed_image(panel, "wall", pixels.width, pixels.height)
 
-    def _marks(self, panel: Panel) -> Marks:
+    def _marks(self, panel: Panel) -> svg.Marks:
         """Where the rays that the box shows meet the wall."""
         if self.lamp_m:
             middle = (np.array([PIXELS, PIXELS * 3 // 4]) - 1) / 2
             return svg.dots([panel.place(middle + (LAMP_PX if self._upright else -LAMP_PX))], "yellow ringed", 10)
         if not self._has("box"):
-            return NOTHING
+            return svg.NOTHING
         ends = panel.place([self._pixel(_POINTS["blue"]), self._pixel(_POINTS["orange"])])
         return svg.line(ends, "yellow dashed thin") + svg.join(
             svg.dots([panel.place(self._pixel(point))], f"{colour} ringed", 8) for colour, point in _POINTS.items()
@@ -256,7 +255,7 @@ class PinholeView(OrbitView):
         """The garden's outlines in camera coordinates; the box is not turned."""
         return garden_outlines() - self.camera().centre
 
-    def _your_panel(self, cell: Cell) -> Marks:
+    def _your_panel(self, cell: Cell) -> svg.Marks:
         """The picture with the garden's outlines over it as the reader's function projects them."""
         panel, picture = self._image_panel("yours", cell)
         pixels, points = self.camera().intrinsics, self._outlines
@@ -267,7 +266,7 @@ class PinholeView(OrbitView):
             return without(panel, problem, title, right=picture + svg.path(panel.place(right), "yellow"))
         return panel.show(picture + svg.path(panel.place(lines), "orange"), title=title)
 
-    def _pixel_numbers(self, x: float, y: float) -> Marks:
+    def _pixel_numbers(self, x: float, y: float) -> svg.Marks:
         """What the reader's function is given, from a place on."""
         pixels, pitch_um = self.camera().intrinsics, 1000 * WALL_MM[0] / PIXELS
         given = [
@@ -306,7 +305,7 @@ class PinholeView(OrbitView):
         x, y, width, height = self._layout["blur"]
         return plot_panel("blur", x + 76, y + 34, width - 84, height - 86, logs(_HOLES), logs(_BLURS))
 
-    def _blur_panel(self, cell: Cell) -> Marks:
+    def _blur_panel(self, cell: Cell) -> svg.Marks:
         panel = self._plot
         hole = np.geomspace(*_HOLES, 121)
         shadow = optics.geometric_blur_mm(hole, self.depth_mm, 1000 * self.object_m)
@@ -329,7 +328,7 @@ class PinholeView(OrbitView):
             content, title="Blur on the wall", hint="drag to change the hole", drag="hole", label=label
         )
 
-    def _best_mark(self, panel: Panel) -> Marks:
+    def _best_mark(self, panel: Panel) -> svg.Marks:
         """Where the blur is least, and the holes that Rayleigh and Young recommend."""
         best = float(optics.best_hole_mm(self.depth_mm))
         young = float(optics.best_hole_mm(self.depth_mm, constant=optics.YOUNG))
@@ -352,13 +351,13 @@ class PinholeView(OrbitView):
 
     # The numbers -----------------------------------------------------------------------------------------------------
 
-    def _numbers(self, layout: Mapping[str, Cell]) -> dict[str, Marks]:
+    def _numbers(self, layout: Mapping[str, Cell]) -> dict[str, svg.Marks]:
         (x, y), (right, top) = ((layout[name][0] + 20, layout[name][1] + 26) for name in _NUMBERS)
         numbers = svg.text((x, y), "This box", "title") + readout(self.numbers(), (x, y + 24), (0, 22), (122, 0))
         numbers = self._pixel_numbers(x, y) if self._has("yours") else numbers
         return {"numbers": numbers, "similar triangles": self._triangles(right, top)}
 
-    def _triangles(self, x: float, y: float) -> Marks:
+    def _triangles(self, x: float, y: float) -> svg.Marks:
         """How tall the crate and globe are on the wall, from a place on."""
         similar = self.equation().replace(" = ", "\n= ").replace("\n", " ", 1)
         words = svg.paragraph((x, y + 24), f"The crate and globe on the wall:\n{similar}", 250, "label")

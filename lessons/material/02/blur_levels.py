@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from camviz.draw import svg
-from camviz.draw.marks import Marks
 from camviz.draw.panel import Panel
 from camviz.lenses.base import Array
 
@@ -13,7 +12,7 @@ DEPTHS, BLURS = (0.5, 40.0), (0.002, 20.0)  # the plot's range: m and mm
 _ROOM = 4.0  # picture units between a name and what is drawn
 
 
-def levels(panel: Panel, curve: Array, allowed_mm: float | None, airy_mm: float | None) -> Marks:
+def levels(panel: Panel, curve: Array, allowed_mm: float | None, airy_mm: float | None) -> svg.Marks:
     """The lines of the blur that is allowed and of the Airy disc, each with its name where the `curve` leaves room.
 
     `curve` (n, 2) is in panel coordinates.

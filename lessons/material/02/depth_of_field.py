@@ -15,7 +15,6 @@ import numpy as np
 from camviz import optics
 from camviz.draw import svg
 from camviz.draw.flow import Cell
-from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import axes, band, curve, legend, logarithmic, logarithmic_grid, logs, plot_panel, upright
@@ -257,7 +256,7 @@ class DepthOfFieldView(View):
         x, y, width, height = self._layout["rays"]
         return lens_diagram.diagram_panel(x + 10, y + 34, width - 20, height - 44)
 
-    def _ray_panel(self) -> Marks:
+    def _ray_panel(self) -> svg.Marks:
         content = lens_diagram.rays(self._rays, self.lens, 1000 * self.distance_m)
         label = "Rays through the lens; drag or press the arrow keys to move the object"
         content += svg.text((8, self._rays.height - 10), "← infinity", "note halo")
@@ -270,14 +269,14 @@ class DepthOfFieldView(View):
         across = width - 20 if width < NARROW else width - 234
         return lens_diagram.loupe_panel(x + 10, y + 34, across, 140, self.lens.image_mm)
 
-    def _loupe_panel(self) -> Marks:
+    def _loupe_panel(self) -> svg.Marks:
         depths = [(1000 * self.distance_m, "blue", "globe"), (np.inf, "orange", "far away")]
         content = lens_diagram.loupe(self._loupe, self.lens, depths)
         label = "Around the sensor, enlarged; drag or press the arrow keys to move the sensor"
         note = "10 mm wide, 2.5 mm tall"
         return self._loupe.show(content, title="At the sensor", note=note, drag="sensor", label=label)
 
-    def _aperture_panel(self) -> Marks:
+    def _aperture_panel(self) -> svg.Marks:
         x, y, width, _ = self._layout["sensor"]
         x, y, width = (x + 10, y + 214, width - 20) if width < NARROW else (x + width - 210, y + 34, 200)
         across = 1.1 * width / 140
@@ -286,7 +285,7 @@ class DepthOfFieldView(View):
         content = lens_diagram.opening(panel, self.lens.aperture, points, passes)
         return panel.show(content, title="Points of the lens")
 
-    def _photograph_panel(self) -> Marks:
+    def _photograph_panel(self) -> svg.Marks:
         panel = image_in(self._layout["photograph"], "lens", 320, 240)
         note = "" if len(self._layout) == 1 else f"{self.lens.sensor_mm:g} × {0.75 * self.lens.sensor_mm:.3g} mm"
         return panel.show(placed_image(panel, "lens", 320, 240), title="The photograph, traced", note=note)
@@ -296,7 +295,7 @@ class DepthOfFieldView(View):
         x, y, width, height = self._layout["blur"]
         return plot_panel("blur", x + 70, y + 34, width - 82, height - 84, logs(DEPTHS), logs(BLURS))
 
-    def _blur_panel(self) -> Marks:
+    def _blur_panel(self) -> svg.Marks:
         panel, (near, far) = self._plot, self.limits_m
         around = 1 + np.outer((-1, 1), np.geomspace(1e-4, 0.1, 9)).ravel()  # the curve comes down steeply to the focus
         depth = np.sort(np.concatenate([np.geomspace(*DEPTHS, 161), self.focus_m * around]))
@@ -325,7 +324,7 @@ class DepthOfFieldView(View):
             shown = panel.show(content, title=title, hint="drag to focus", drag="focus", label=label)
         return axes(panel, "distance from the lens [m]", "blur [µm]", xticks, yticks, aside=56) + shown
 
-    def _your_part(self, panel: Panel, depth_m: np.ndarray) -> tuple[Marks, str]:
+    def _your_part(self, panel: Panel, depth_m: np.ndarray) -> tuple[svg.Marks, str]:
         """The reader's blur over distance, their limits and the names of both; and what is wrong with either."""
         drawn, entries, problems = svg.NOTHING, [], []
         state = (self.focal_mm, self.f_number)
@@ -344,10 +343,10 @@ class DepthOfFieldView(View):
         words = "\n".join(filter(None, dict.fromkeys(problems)))
         drawn += legend(panel, entries, "top right") if entries else svg.NOTHING
         below = 40 * len(entries)  # the legend, where it is shown largest
-        drawn += svg.paragraph((12, 22 + below), words, panel.width - 24, "note halo") if words else NOTHING
+        drawn += svg.paragraph((12, 22 + below), words, panel.width - 24, "note halo") if words else svg.NOTHING
         return drawn, words if all(is_unwritten(one) for one in problems) else ""
 
-    def _numbers(self) -> Marks:
+    def _numbers(self) -> svg.Marks:
         x, y, _, high = self._layout["numbers"]
         figures = self._told()
         if self._has("rays") and self._has("blur"):

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 
 from camviz import optics
 from camviz.draw import svg
-from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel
 from camviz.lenses.base import Array
 from camviz.views.marks import circle
@@ -43,7 +42,7 @@ def before_lens(z_mm: ArrayLike, y_mm: ArrayLike) -> Array:
     return np.stack([-HORIZON_MM * (1 - share), y * share], axis=-1)
 
 
-def rays(panel: Panel, lens: ThinLensCamera, object_mm: float) -> Marks:
+def rays(panel: Panel, lens: ThinLensCamera, object_mm: float) -> svg.Marks:
     """Axis, focal points, object and image, the sensor, the lens with its stop, and the rays that make the image."""
     f, v = lens.focal_mm, float(optics.image_distance_mm(lens.focal_mm, object_mm))
     axis = svg.line(panel.place([(panel.left, 0), (panel.right, 0)]), "muted dashed thin")
@@ -61,16 +60,16 @@ def rays(panel: Panel, lens: ThinLensCamera, object_mm: float) -> Marks:
     )
 
 
-def _central_ray(panel: Panel, tip: Array, image: Array) -> Marks:
+def _central_ray(panel: Panel, tip: Array, image: Array) -> svg.Marks:
     """The ray through the middle of the lens, which alone is not bent, on to the edge of the panel."""
     return svg.line(panel.place(np.array([tip, (0.0, 0.0), image * panel.right / image[0]])), "muted")
 
 
-def _cones(panel: Panel, lens: ThinLensCamera, object_mm: float, tip: Array, image: Array) -> Marks:
+def _cones(panel: Panel, lens: ThinLensCamera, object_mm: float, tip: Array, image: Array) -> svg.Marks:
     """All the light from the object's foot and from its tip: cones as wide as the aperture, and then to a point."""
     half, foot = lens.aperture_mm / 2, before_lens(object_mm, 0.0)
     shade = svg.polygon(panel.place(np.array([foot, (0, half), (image[0], 0), (0, -half)])), "wash fill-blue")
-    edges = NOTHING
+    edges = svg.NOTHING
     for start, end, class_ in ((foot, image * (1, 0), "blue thin"), (tip, image, "orange thin")):
         rims = [np.array([0.0, side * half]) for side in (1, -1)]
         beyond = [rim + (end - rim) * panel.right / end[0] for rim in rims]
@@ -84,7 +83,7 @@ def cone_height(lens: ThinLensCamera, object_mm: float, z_mm: float) -> float:
     return lens.aperture_mm / 2 * (1 - z_mm / v)
 
 
-def _lens(panel: Panel, lens: ThinLensCamera) -> Marks:
+def _lens(panel: Panel, lens: ThinLensCamera) -> svg.Marks:
     """A slim lens, its glass as tall as an f/1.2 would need, and the stop that leaves only the aperture open."""
     half, open_ = 0.5 * lens.focal_mm / 1.2, lens.aperture_mm / 2
     y = np.linspace(-half, half, 25)
@@ -96,24 +95,24 @@ def _lens(panel: Panel, lens: ThinLensCamera) -> Marks:
     return glass + svg.path([panel.place(stop) for stop in stops], "ink thick")
 
 
-def _sensor(panel: Panel, lens: ThinLensCamera) -> Marks:
+def _sensor(panel: Panel, lens: ThinLensCamera) -> svg.Marks:
     half = lens.sensor_mm * lens.height / lens.width / 2
     ends = panel.place([(lens.image_mm, half), (lens.image_mm, -half)])
     return svg.line(ends, "red thick") + _name(panel, ends[1] + (0, 16), "sensor", "red")
 
 
-def _name(panel: Panel, at: Array, words: str, class_: str) -> Marks:
+def _name(panel: Panel, at: Array, words: str, class_: str) -> svg.Marks:
     """A name over a place, moved as far as it takes to stay inside the panel."""
     return svg.text((np.clip(at[0], 36, panel.width - 36), at[1]), words, f"{class_} halo middle")
 
 
-def _focal_points(panel: Panel, f: float) -> Marks:
+def _focal_points(panel: Panel, f: float) -> svg.Marks:
     places = panel.place(np.array([before_lens(f, 0.0), (f, 0.0)]))
     names = (svg.text(p + (-9, 19), name, "green halo end") for p, name in zip(places, ("F", "F'"), strict=True))
     return svg.dots(places, "green", 8) + svg.join(names)
 
 
-def _arrow(panel: Panel, foot: Array, tip: Array, class_: str) -> Marks:
+def _arrow(panel: Panel, foot: Array, tip: Array, class_: str) -> svg.Marks:
     a, b = panel.place(np.array([foot, tip]))
     head = min(7.0, abs(b[1] - a[1]) / 2)
     back = np.sign(a[1] - b[1]) * head
@@ -121,12 +120,12 @@ def _arrow(panel: Panel, foot: Array, tip: Array, class_: str) -> Marks:
     return svg.path([[a, b], barbs], f"{class_} thick")
 
 
-def loupe(panel: Panel, lens: ThinLensCamera, depths: list[tuple[float, str, str]]) -> Marks:
+def loupe(panel: Panel, lens: ThinLensCamera, depths: list[tuple[float, str, str]]) -> svg.Marks:
     """The ends of the cones from points of the axis, each (depth in mm, class, name), and the sensor that cuts them."""
     middle = panel.place([(lens.image_mm, panel.top), (lens.image_mm, panel.bottom)])
     axis = panel.place([(panel.left, 0), (panel.right, 0)])
     cones = svg.join(_cone_end(panel, lens, depth, class_) for depth, class_, _ in depths)
-    names = NOTHING
+    names = svg.NOTHING
     for (depth, class_, name), y in zip(depths, (18, panel.height - 10), strict=True):
         v = float(optics.image_distance_mm(lens.focal_mm, depth))
         x = float(np.clip(panel.place((v, 0))[0], 74, panel.width - 74))  # its name stands beside it, off the sensor
@@ -135,7 +134,7 @@ def loupe(panel: Panel, lens: ThinLensCamera, depths: list[tuple[float, str, str
     return svg.line(axis, "muted dashed thin") + svg.line(middle, "red") + cones + names
 
 
-def _cone_end(panel: Panel, lens: ThinLensCamera, depth_mm: float, class_: str) -> Marks:
+def _cone_end(panel: Panel, lens: ThinLensCamera, depth_mm: float, class_: str) -> svg.Marks:
     """Where the light of a point comes together and parts again, and how wide the sensor cuts it."""
     v = float(optics.image_distance_mm(lens.focal_mm, depth_mm))
     (left, right), at_sensor = (
@@ -149,7 +148,7 @@ def _cone_end(panel: Panel, lens: ThinLensCamera, depth_mm: float, class_: str) 
     return shade + svg.path([panel.place(edge) for edge in edges], class_) + svg.line(cut, f"{class_} thick")
 
 
-def opening(panel: Panel, aperture: Aperture, points: Array, passes: Array) -> Marks:
+def opening(panel: Panel, aperture: Aperture, points: Array, passes: Array) -> svg.Marks:
     """The lens from behind: which of its points look at the scene, and which are stopped."""
     rim = panel.place(circle(49))
     through, stopped = panel.place(points[passes > 0]), panel.place(points[passes <= 0])

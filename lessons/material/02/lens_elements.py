@@ -11,7 +11,6 @@ import numpy as np
 from camviz import optics
 from camviz.draw import svg
 from camviz.draw.flow import rows
-from camviz.draw.marks import Marks
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
 from camviz.draw.readout import listed, readout
@@ -89,7 +88,7 @@ class LensElementsView(View):
         half = max((right - left) * _TALL / _WIDE / 2, 1.1 * _HIGHEST_MM)
         return Panel("section", 10, 34, _WIDE, _TALL, right - 2 * half * _WIDE / _TALL, right, half, -half)
 
-    def _section(self) -> Marks:
+    def _section(self) -> svg.Marks:
         panel, lens = self._panel, self.prescription
         slope = self.image_mm / lens.focal_mm
         end = lens.length_mm + lens.back_focal_mm
@@ -115,7 +114,7 @@ class LensElementsView(View):
         (z0, y0), (z1, y1) = ray[-2:]
         return float(y1 + (self.prescription.rear_principal_mm - z1) * (y1 - y0) / (z1 - z0))
 
-    def _plane(self, z: float, name: str, side: int) -> Marks:
+    def _plane(self, z: float, name: str, side: int) -> svg.Marks:
         panel = self._panel
         top, bottom = panel.place([(z, 0.86 * panel.top), (z, 0.86 * panel.bottom)])
         side = -side if not 30 < top[0] < panel.width - 30 else side  # where the border would cut the name

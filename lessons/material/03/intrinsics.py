@@ -16,7 +16,6 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
 from camviz.draw.flow import WIDTH, Cell, rows, shortened
 from camviz.draw.items import closed
-from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.matrix import intrinsic_matrix
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
@@ -160,22 +159,22 @@ class IntrinsicsView(CameraMatrix):
         """In the pixels of the picture as taken."""
         return image_in(self._layout["picture"], "picture", self.width, self.height)
 
-    def _picture_panel(self) -> Marks:
+    def _picture_panel(self) -> svg.Marks:
         panel, K = self._picture, self.intrinsics
         coarse = {"style": "image-rendering:pixelated"} if K.width < 200 else {}
         content = placed_image(panel, "camera", self.width, self.height, **coarse) + self._window()
-        content += self._behind() if self._marked("balloon") else NOTHING
-        content += self._globe() if self._marked("globe") else NOTHING
-        content += self._principal_point() if self._marked("centre") else NOTHING
+        content += self._behind() if self._marked("balloon") else svg.NOTHING
+        content += self._globe() if self._marked("globe") else svg.NOTHING
+        content += self._principal_point() if self._marked("centre") else svg.NOTHING
         note = f"{K.width} × {K.height} pixels"
         title = "The picture" if self.operation == "as taken" else f"The picture, {self.operation}"
         return panel.show(content, title=title, note=note)
 
-    def _window(self) -> Marks:
+    def _window(self) -> svg.Marks:
         """The corners' names in the picture's own pixels; around a crop, what it leaves out."""
         panel, K = self._picture, self.intrinsics
         (x0, y0), (x1, y1) = self._as_taken([(-0.5, -0.5), (K.width - 0.5, K.height - 0.5)])
-        names = NOTHING
+        names = svg.NOTHING
         if self._marked("corners"):
             names = _tag((x0 + 8, y0 + 17), "(0, 0)") + _tag(
                 (x1 - 8, y1 - 9), f"({K.width - 1}, {K.height - 1})", "end"
@@ -194,7 +193,7 @@ class IntrinsicsView(CameraMatrix):
         """Panel coordinates (..., 2) of pixels (..., 2) of the picture after the operation: the same rays."""
         return self._picture.place(self.taken.to_pixels(self.intrinsics.from_pixels(uv)))
 
-    def _principal_point(self) -> Marks:
+    def _principal_point(self) -> svg.Marks:
         K = self.intrinsics
         at = self._as_taken((K.cx, K.cy))
         ends = at - np.diag((12, 12)), at + np.diag((12, 12))
@@ -203,27 +202,27 @@ class IntrinsicsView(CameraMatrix):
         inside = np.clip(at + (dx, 22), (8, 36), np.array([self._picture.width, self._picture.height]) - (8, 30))
         before, after = "← " if at[0] < 0 else "", " →" if at[0] > self._picture.width else ""
         name = _tag(inside, f"{before}(cx, cy){after}", side)
-        hand = svg.disc(at, 16, "card", fill_opacity=0)
+        hand = svg.circle(at, 16, "card", fill_opacity=0)
         label = f"Principal point at column {K.cx:.1f}, row {K.cy:.1f}; arrow keys move it"
         return svg.handle(hand + cross + name, "principal", label)
 
-    def _behind(self) -> Marks:
+    def _behind(self) -> svg.Marks:
         """Where in the picture the balloon is, whether or not it can be seen."""
         outline = self._seen(balloon_rim(self.camera.centre))
         if not self._in_picture(outline):
-            return NOTHING
+            return svg.NOTHING
         hidden = self.in_sight() < 0.5
         top = outline[np.argmin(outline[:, 1])] - (0, 11)
         ring = svg.line(outline, "white", stroke="#fff", stroke_width=4.5) if hidden else svg.NOTHING
         words = "a balloon, behind the wall" if hidden else "the balloon"
         return ring + svg.line(outline, f"red thick{' dotted' if hidden else ''}") + _tag(top, words, "middle")
 
-    def _globe(self) -> Marks:
+    def _globe(self) -> svg.Marks:
         """How wide the globe is, in the pixels of the picture after the operation."""
         ends = GLOBE + np.array([(-GLOBE_RADIUS, -GLOBE_RADIUS - 0.08, 0), (GLOBE_RADIUS, -GLOBE_RADIUS - 0.08, 0)])
         left, right = self._seen(ends)
         if not self._in_picture((left, right)):
-            return NOTHING
+            return svg.NOTHING
         pixels = self.intrinsics.fx * 2 * GLOBE_RADIUS / self.distance
         half = np.array((0, 5))
         bar = svg.segments([left, left - half, right - half], [right, left + half, right + half], "green thick")
@@ -267,7 +266,7 @@ class IntrinsicsView(CameraMatrix):
             items += [Line(_ray(whole, corner, 1.4), "muted dashed", 1.0) for corner in self.taken.border(1)]
         return items
 
-    def _your_rays(self) -> tuple[list[Item], Marks, str]:
+    def _your_rays(self) -> tuple[list[Item], svg.Marks, str]:
         """The rays of the picture's corners and border by the reader's function, as long as right ones to one depth,
         which are blue; words over them; and what is wrong with it. An unwritten one has right rays to wait for it.
         """
@@ -298,7 +297,7 @@ class IntrinsicsView(CameraMatrix):
 
     # The matrices ----------------------------------------------------------------------------------------------------
 
-    def _matrices(self) -> dict[str, Marks]:
+    def _matrices(self) -> dict[str, svg.Marks]:
         """K, and what becomes of it: in a tile beside it, or in one narrow tile below it."""
         x, y, across, _ = self._layout["K"]
         x, y = x + 10, y + 48
@@ -309,7 +308,7 @@ class IntrinsicsView(CameraMatrix):
         left, _, wide, _ = self._layout[_AFTER]
         return {"K": before, _AFTER: self._afterwards(left + 10, y, wide - 20)}
 
-    def _afterwards(self, x: float, y: float, width: float) -> Marks:
+    def _afterwards(self, x: float, y: float, width: float) -> svg.Marks:
         """What the operation makes of K, and by which rule; of a picture as taken, what K does."""
         K = self.intrinsics
         if self.operation == "as taken":
@@ -322,7 +321,7 @@ class IntrinsicsView(CameraMatrix):
         after = intrinsic_matrix(x, y, f"K, {self.operation}", K.K, changed)
         return after + svg.paragraph((x, y + 98), self.rule(), width)
 
-    def _lattice_panel(self) -> dict[str, Marks]:
+    def _lattice_panel(self) -> dict[str, svg.Marks]:
         """A few pixels as they lie on the sensor, their lean drawn larger than it is."""
         K = replace(self.intrinsics, skew=_LEAN_DRAWN * self.intrinsics.skew)
         x, y, across, high = self._layout["pixels"]
@@ -349,7 +348,7 @@ class IntrinsicsView(CameraMatrix):
         note = f"lean drawn {_LEAN_DRAWN} ×" if K.skew else ""
         return {"pixels": panel.show(content, title="Its pixels", note=note)}
 
-    def _numbers_column(self) -> dict[str, Marks]:
+    def _numbers_column(self) -> dict[str, svg.Marks]:
         """All figures, and the shape of a pixel only beside K or pixels, or where millimetres count."""
         x, y, _, _ = self._layout["numbers"]
         figures = self.numbers()
@@ -378,12 +377,9 @@ class IntrinsicsView(CameraMatrix):
         return self.dragged(handle, float("nan"), float("nan"), float(dx), float(dy))
 
 
-def _tag(at: Any, words: str, anchor: str = "") -> Marks:
+def _tag(at: Any, words: str, anchor: str = "") -> svg.Marks:
     """Words on a photograph: white with a dark edge, whatever the theme."""
-    return svg.text(
-        at, words, f"label {anchor}", fill="#fff", stroke="#10151c", stroke_width=4, stroke_linejoin="round",
-        paint_order="stroke",
-    )  # fmt: skip
+    return svg.text(at, words, f"label halo {anchor}", fill="#fff", stroke="#10151c", stroke_width=4)
 
 
 def _ray(camera: Camera, uv: Array, length: float) -> Array:

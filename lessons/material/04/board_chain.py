@@ -10,7 +10,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from camviz.draw import svg
-from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel
 from camviz.lenses.base import Array, unit
 from camviz.scenes import board_corners
@@ -51,13 +50,13 @@ class ChainView(FrustumView):
         on_board = np.column_stack([board_corners(), np.ones(54)]) @ np.linalg.inv(given[1]).T
         return (on_board @ (right if is_unwritten(problem) else answer).T)[:, :3], problem
 
-    def _corners(self, panel: Panel) -> Marks:
+    def _corners(self, panel: Panel) -> svg.Marks:
         return svg.dots(panel.place(self.camera.project(board_corners())), "blue", 4)
 
-    def _your_corners(self, panel: Panel) -> Marks:
+    def _your_corners(self, panel: Panel) -> svg.Marks:
         (corners, problem), k = self.your_corners, self.camera.intrinsics
         if self.chain is None or (problem and not is_unwritten(problem)):
-            return svg.paragraph((14, 24), problem, panel.width - 28) if problem else NOTHING
+            return svg.paragraph((14, 24), problem, panel.width - 28) if problem else svg.NOTHING
         x, y, z = np.where(corners[:, 2:] > 0, corners, np.nan).T
         uv = (np.stack([x / z, y / z, np.ones(54)], axis=-1) @ k.K.T)[:, :2]
         inside = panel.place(uv[k.contains(uv)])

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
 from camviz.draw.flow import rows
-from camviz.draw.marks import Marks
 from camviz.draw.picture import Picture
 from camviz.draw.readout import decimal, vector
 from camviz.draw.space import Dots, Item, Label, Line, OrbitCamera, axes_triad, camera_body, space_panel
@@ -125,7 +124,7 @@ class RotationView(OrbitView):
             outside = radius
         return items
 
-    def _numbers_panel(self) -> Marks:
+    def _numbers_panel(self) -> svg.Marks:
         n = self.numbers()
         apart = f"{n['lock_deg']:.0f}°" + (", gimbal lock" if self.locked else "")
         rows = [

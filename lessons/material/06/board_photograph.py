@@ -6,7 +6,6 @@ import numpy as np
 
 from camviz.cameras import Camera, transform
 from camviz.draw import svg
-from camviz.draw.marks import Marks
 from camviz.draw.panel import Panel, placed_image
 from camviz.lenses.base import Array
 from camviz.poses import RigidTransform
@@ -25,7 +24,7 @@ def behind(camera: Camera) -> dict[str, bytes]:
     return {BEHIND: garden.taken(camera, garden.FINE)[1]}
 
 
-def held_board(panel: Panel, board: Board, cam_from_board: RigidTransform, camera: Camera) -> Marks:
+def held_board(panel: Panel, board: Board, cam_from_board: RigidTransform, camera: Camera) -> svg.Marks:
     """The garden, and the board before it: its white sheet and its dark squares, brighter where they face the light."""
     turned = cam_from_board.rotation.as_matrix()[:, 2]
     bright = 0.62 + 0.38 * float(abs(turned @ _LIGHT)) / float(np.linalg.norm(_LIGHT))

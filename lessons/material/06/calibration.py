@@ -15,7 +15,6 @@ import numpy as np
 from camviz.cameras import Camera, transform
 from camviz.draw import svg
 from camviz.draw.flow import Cell, Part, rows, shortened
-from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, signed
@@ -195,7 +194,7 @@ class CalibrationView(OrbitView, EstimateNumbers):
         """Whether the picture is one of the virtual camera, which is taken here, and not all corners at once."""
         return not (self.photographs or self._has(_CORNERS) or self.seen is not None)
 
-    def _image(self) -> Marks:
+    def _image(self) -> svg.Marks:
         panel = self._image_panel
         others = np.delete(self.corners, self.index, axis=0)
         marks = svg.dots(panel.place(others), "muted", 2.6) + self._vectors(panel) + self._handle(panel)
@@ -215,7 +214,7 @@ class CalibrationView(OrbitView, EstimateNumbers):
         title = f"Picture {self.index + 1} of {self.count}" if one else "What the camera saw"
         return panel.show(content, title=title, note=note, **drag)
 
-    def _coverage(self, panel: Panel) -> Marks:
+    def _coverage(self, panel: Panel) -> svg.Marks:
         """Cells in which corners were seen, the darker the more."""
         uv = self.corners[self.used].reshape(-1, 2)
         uv = uv[np.isfinite(uv).all(axis=1)]
@@ -230,7 +229,7 @@ class CalibrationView(OrbitView, EstimateNumbers):
             for i in (1, 2, 3)
         )
 
-    def _outlined(self, panel: Panel) -> Marks:
+    def _outlined(self, panel: Panel) -> svg.Marks:
         """The picked board: its rows and columns of corners, in the order in which they are found."""
         uv = panel.place(self.corners[self.index]).reshape(self.board.rows, self.board.columns, 2)
         strength = " thin half" if self.photographs else "" if self.used[self.index] else " dashed"
@@ -242,14 +241,14 @@ class CalibrationView(OrbitView, EstimateNumbers):
         typical = self.adjustment.rms if self.adjustment else 1.0
         return float(_MAGNIFIED[np.abs(np.log(_MAGNIFIED * max(typical, 1e-3) / 9)).argmin()])
 
-    def _vectors(self, panel: Panel) -> Marks:
+    def _vectors(self, panel: Panel) -> svg.Marks:
         """The residuals, magnified, from where the estimated camera projects a corner towards where it was detected."""
         if self.adjustment is None:
-            return NOTHING
+            return svg.NOTHING
         projected = self.corners - self.residuals
         starts, ends = panel.place(projected), panel.place(projected + self.magnified * self.residuals)
         others = np.arange(self.count) != self.index
-        faint = NOTHING if self.photographs else svg.segments(starts[others], ends[others], "red thin half")
+        faint = svg.NOTHING if self.photographs else svg.segments(starts[others], ends[others], "red thin half")
         dots = svg.dots(panel.place(self.corners[self.index]), "orange", 4)
         return faint + dots + svg.segments(starts[self.index], ends[self.index], "red")
 
@@ -259,13 +258,13 @@ class CalibrationView(OrbitView, EstimateNumbers):
         pose, middle = self.cam_from_board[self.index], middle_of(self.board)
         return self._true_camera.project(transform(pose, [middle, middle - (0, 0, _NORMAL)]))
 
-    def _handle(self, panel: Panel) -> Marks:
+    def _handle(self, panel: Panel) -> svg.Marks:
         if self.seen is not None:
-            return NOTHING
+            return svg.NOTHING
         middle, tip = panel.place(self._grips)
         tip = np.clip(np.where(np.isfinite(tip), tip, middle), 10, np.array([panel.width, panel.height]) - 10)
         words = "A stick upright on the board: drag it, or press the arrow keys, to tilt the board"
-        hand = svg.disc(tip, 16, "card", fill_opacity=0)
+        hand = svg.circle(tip, 16, "card", fill_opacity=0)
         knob = hand + svg.dots([tip], "paper-dot", 15) + svg.dots([tip], "orange", 11)
         grip = svg.handle(knob, "tilt", words)
         return svg.line([middle, tip], "orange thick") + svg.dots([middle], "orange", 6) + grip

@@ -14,7 +14,6 @@ import numpy as np
 from camviz.cameras import Camera, transform
 from camviz.draw import svg
 from camviz.draw.flow import Cell
-from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.readout import true_minus
 from camviz.poses import RigidTransform
 from camviz.views.yours import YOURS_HERE, is_unwritten, tried
@@ -45,7 +44,7 @@ class ErrorBars(BoardPictures):
             return float("nan")
         return 100 * abs(self.camera.intrinsics.fx / self.truth.intrinsics.fx - 1)
 
-    def _fit(self, cell: Cell) -> Marks:
+    def _fit(self, cell: Cell) -> svg.Marks:
         """What a report of a calibration says, and how far its focal length is off."""
         x, y, width = cell[0] + 14, cell[1], cell[2] - 28
         parts = [svg.text((x, y + 26), "What the program reports", "title")]
@@ -67,7 +66,7 @@ class ErrorBars(BoardPictures):
             parts.append(svg.text((x, y + 118), f"fx = {fx} px in place of {true}", "number"))
         return svg.join(parts)
 
-    def _your_bar(self, x: float, y: float, width: float) -> Marks:
+    def _your_bar(self, x: float, y: float, width: float) -> svg.Marks:
         assert self.adjustment
         value, problem = self._by_your_rms(slice(None))
         waits = is_unwritten(problem)
@@ -89,7 +88,7 @@ class ErrorBars(BoardPictures):
 
     # Two kinds of error -----------------------------------------------------------------------------------------------
 
-    def _errors(self, cell: Cell) -> Marks:
+    def _errors(self, cell: Cell) -> svg.Marks:
         x, y, longest = cell[0] + 14, cell[1], cell[2] - 28 - _NUMBER
         title = svg.text((x, y + 26), "Two kinds of error", "title")
         if self.adjustment is None:
@@ -98,16 +97,16 @@ class ErrorBars(BoardPictures):
         bars += [("on boards it has not seen", self.held_out, "fill-red")] if np.isfinite(self.held_out) else []
         mark = 0.0 if self.seen is not None or self.noise < _LOW else longest * _share(np.sqrt(2) * self.noise)
         parts = [_bar(x, y + 40 + 64 * i, longest, *bar, mark) for i, bar in enumerate(bars)]
-        return title + (self._noise_mark(x + mark, y) if mark else NOTHING) + svg.join(parts)
+        return title + (self._noise_mark(x + mark, y) if mark else svg.NOTHING) + svg.join(parts)
 
-    def _noise_mark(self, x: float, y: float) -> Marks:
+    def _noise_mark(self, x: float, y: float) -> svg.Marks:
         """What the noise alone would leave: √2 times its standard deviation in u and v."""
         mark = svg.segments([(x, y + 60), (x, y + 124)], [(x, y + 84), (x, y + 148)], "ink")
         return mark + svg.text((x, y + 166), "noise alone", "tick middle")
 
     # Each board -------------------------------------------------------------------------------------------------------
 
-    def _each_board(self, cell: Cell) -> Marks:
+    def _each_board(self, cell: Cell) -> svg.Marks:
         x, y, width, height = cell[0] + 14, cell[1], cell[2] - 28, min(cell[3], 250)
         title = svg.text((x, y + 26), "RMS error of each board", "title")
         if self.adjustment is None:
@@ -128,10 +127,10 @@ class ErrorBars(BoardPictures):
             parts.append(svg.text((x + width, y + 52), words, "number end halo"))
         return svg.join(parts) + self._your_marks(x, foot, step, full / top, width)
 
-    def _your_marks(self, x: float, foot: float, step: float, scale: float, width: float) -> Marks:
+    def _your_marks(self, x: float, foot: float, step: float, scale: float, width: float) -> svg.Marks:
         """The reader's RMS errors as lines across the bars; where the function is not written, the right ones."""
         if self.your_rms is None:
-            return NOTHING
+            return svg.NOTHING
         found = [self._by_your_rms(i) for i in range(self.count)]
         problem = next((problem for _, problem in found if problem), "")
         if problem and not is_unwritten(problem):
@@ -157,13 +156,13 @@ class ErrorBars(BoardPictures):
         f, z = camera.intrinsics.fx, transform(poses[self.index], middle_of(self.board))[2]
         return f"{number('fx', f)} / {z:.3f} m = {f / z:.0f}"
 
-    def _facts(self, x: float, y: float) -> Marks:
+    def _facts(self, x: float, y: float) -> svg.Marks:
         """The quotient that the picked board shows."""
         lines = [svg.text((x, y + 28 + 28 * i), words, "number") for i, words in enumerate(self.levers())]
         return svg.text((x, y), f"fx / Z of board {self.index + 1}, px/m", "note") + svg.join(lines)
 
 
-def _bar(x: float, y: float, longest: float, words: str, value: float, class_: str, mark: float) -> Marks:
+def _bar(x: float, y: float, longest: float, words: str, value: float, class_: str, mark: float) -> svg.Marks:
     """An error in pixels as a bar, with its name above it and its number at its end, or beyond a mark close to it."""
     length = longest * _share(value)
     end = mark if length < mark < length + _NUMBER else length
@@ -174,7 +173,7 @@ def _bar(x: float, y: float, longest: float, words: str, value: float, class_: s
     )
 
 
-def _large_bar(x: float, y: float, width: float, words: str, share: float, class_: str) -> Marks:
+def _large_bar(x: float, y: float, width: float, words: str, share: float, class_: str) -> svg.Marks:
     """A bar as long as its share of the longest, with its name above it; an arrow where it would be longer."""
     longest = width - _NUMBER
     length = longest * float(np.clip(share, 0.008, 1))
@@ -182,10 +181,10 @@ def _large_bar(x: float, y: float, width: float, words: str, share: float, class
     if share > 1:
         tip = [(x + longest, y + 22), (x + longest + 13, y + 35), (x + longest, y + 48)]
         bar += svg.polygon(tip, class_)
-    return (svg.text((x, y + 14), words, "label") if words else NOTHING) + bar
+    return (svg.text((x, y + 14), words, "label") if words else svg.NOTHING) + bar
 
 
-def _large_number(x: float, y: float, width: float, share: float, words: str, colour: str = "") -> Marks:
+def _large_number(x: float, y: float, width: float, share: float, words: str, colour: str = "") -> svg.Marks:
     at = x + (width - _NUMBER) * float(np.clip(share, 0.008, 1)) + (18 if share > 1 else 8)
     return svg.text((at, y + 42), words, f"title {colour}".strip())
 

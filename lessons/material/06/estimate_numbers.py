@@ -10,7 +10,6 @@ import numpy as np
 from camviz.cameras import Camera
 from camviz.draw import svg
 from camviz.draw.flow import Cell
-from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel
 from camviz.draw.readout import signed
 from camviz.lenses import BrownConrady
@@ -30,7 +29,7 @@ class EstimateNumbers(ErrorBars):
         """The camera whose lens and principal point are taken as known: the true one, or that which was estimated."""
         return self.truth or self.camera or self._true_camera
 
-    def _estimates(self, cell: Cell) -> Marks:
+    def _estimates(self, cell: Cell) -> svg.Marks:
         left, y, width, _ = cell
         heads = ("", "true" if self.truth else "", "estimate", "± σ")
         x = (left + 14, *(left + 14 + share * (width - 28) for share in (0.4, 0.7, 1.0)))
@@ -46,7 +45,7 @@ class EstimateNumbers(ErrorBars):
             parts += [svg.text((at, below), one, "number end") for at, one in zip(x[1:], words, strict=True)]
         return svg.join(parts)
 
-    def _strip(self, cell: Cell) -> Marks:
+    def _strip(self, cell: Cell) -> svg.Marks:
         """Every estimate's distance from the truth with ± σ and ± 2σ, in pixels on a scale that is linear near 0."""
         x, y, width, _ = cell
         panel = Panel("estimates", x + 46, y + 46, width - 60, _ROW * len(INTRINSICS), -1, 1, 0, len(INTRINSICS))
@@ -68,13 +67,13 @@ class EstimateNumbers(ErrorBars):
         title = svg.text((x + 14, y + 26), "Estimate less truth ± σ, px" if self.truth else "σ and 2σ, px", "title")
         return title + panel.show(svg.join(lines + dots)) + svg.join(names + ticks) + note
 
-    def _dot(self, panel: Panel, name: str, row: int) -> Marks:
+    def _dot(self, panel: Panel, name: str, row: int) -> svg.Marks:
         value, sigma = self.estimates.get(name, (np.nan, np.nan))
         unit = self._pixels_per[name]
         error = (value - self.true[name]) * unit if self.truth else 0.0
         free = name in FREE[self.free]
         if not np.isfinite(error) or (not free and not self.truth):
-            return NOTHING
+            return svg.NOTHING
         reach = _squeezed(error + np.array([-2, 2, -1, 1, 0]) * sigma * unit)
         (a, y), (b, _), (c, _), (d, _), at = panel.place(np.stack([reach, np.full(5, row + 0.5)], axis=-1))
         if not free:

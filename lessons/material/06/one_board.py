@@ -10,7 +10,6 @@ import numpy as np
 
 from camviz.cameras import Camera
 from camviz.draw import plot, svg
-from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel
 from camviz.draw.readout import true_minus
 from camviz.lenses.base import Array
@@ -68,7 +67,7 @@ def _straightened(corners: Array, camera: Camera) -> Array:
 
 def panel_of_each(
     each: FromEach, camera: Camera, picked: int, place: tuple[float, float, float, float], yours: bool
-) -> Marks:
+) -> svg.Marks:
     """The plot: a pair of marks for every board, the known focal length as a line, the reader's own in orange."""
     x, y, width, height = place
     count, known = len(each.right), camera.intrinsics.fx
@@ -92,14 +91,14 @@ def panel_of_each(
     return axes + shown + _written(each, picked, yours and not is_unwritten(each.problem), x - 62, y + height + 62)
 
 
-def _marks(panel: Panel, values: Array, colour: str, diameter: float) -> Marks:
+def _marks(panel: Panel, values: Array, colour: str, diameter: float) -> svg.Marks:
     """Dots, or bars across them where the diameter is 0; an arrowhead at the edge for what lies outside."""
     boards = np.arange(1, len(values) + 1)[:, None] + np.array([-_ASIDE, _ASIDE])
     at = panel.place(np.stack([boards, values], axis=-1)).reshape(-1, 2)
     at = at[np.isfinite(at).all(axis=1)]
     inside = (at[:, 1] > 0) & (at[:, 1] < panel.height)
     half = 0.3 * panel.width / (panel.right - panel.left) * np.array([1, 0]) * 0.6
-    marks = svg.dots(at[inside], colour, diameter) if diameter else NOTHING
+    marks = svg.dots(at[inside], colour, diameter) if diameter else svg.NOTHING
     marks += svg.NOTHING if diameter else svg.segments(at[inside] - half, at[inside] + half, f"{colour} thick")
     for px, py in at[~inside]:
         edge, inward = (2, 9) if py < 0 else (panel.height - 2, -9)
@@ -107,7 +106,7 @@ def _marks(panel: Panel, values: Array, colour: str, diameter: float) -> Marks:
     return marks
 
 
-def _written(each: FromEach, picked: int, yours: bool, x: float, y: float) -> Marks:
+def _written(each: FromEach, picked: int, yours: bool, x: float, y: float) -> svg.Marks:
     rows = [("number", f"board {picked + 1} alone: {_pair(each.right[picked])}")]
     if yours:
         rows.append(("number orange", f"yours: {_pair(each.yours[picked])}"))

@@ -16,7 +16,6 @@ import numpy as np
 from camviz.cameras import Camera
 from camviz.draw import svg
 from camviz.draw.flow import Cell, Part, rows
-from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, true_minus
@@ -164,7 +163,7 @@ class RectificationView(TurningPair):
         beside, below = (76, 24) if name in ("disparity", "second") else (0, 0)
         return image_in((x, y, width - beside, height - below), name, size.width, size.height)
 
-    def _picture_panel(self, name: str) -> Marks:
+    def _picture_panel(self, name: str) -> svg.Marks:
         panel, now = self._image_panel(name), getattr(self.stage, name)
         content = svg.join([
             placed_image(panel, name, now.intrinsics.width, now.intrinsics.height),
@@ -185,17 +184,17 @@ class RectificationView(TurningPair):
         uv = np.stack(np.broadcast_arrays(u, rows[:, None]), axis=-1)
         return clipped(panel, panel.place(seen_from_there(now, self.stage.pair.left, uv)))
 
-    def _pencil(self, panel: Panel, now: Camera) -> Marks:
+    def _pencil(self, panel: Panel, now: Camera) -> svg.Marks:
         height = self.stage.pair.left.intrinsics.height
         lines = self._epipolar(panel, now, np.linspace(-0.5, 1.5, 2 * _ROWS + 1) * height)
         return svg.segments(lines[:, 0], lines[:, 1], "yellow thin half")
 
-    def _same_row(self, panel: Panel) -> Marks:
+    def _same_row(self, panel: Panel) -> svg.Marks:
         """The left mark's row in both pictures: where a matcher looks, whether the partner is there or not."""
         v = panel.place(self.uv_left)[1]
         return on_photograph([[(0, v), (panel.width, v)]], "orange dashed")
 
-    def _mark(self, panel: Panel) -> Marks:
+    def _mark(self, panel: Panel) -> svg.Marks:
         at = panel.place(self.uv_left if panel.name == "left" else self.uv_right)
         return ring(at, "red", 8) + svg.dots([at], "red", 5)
 
@@ -209,12 +208,12 @@ class RectificationView(TurningPair):
         title = "Depth" if self.show == "depth" else "True depth"
         return "depth", title, *stereo_pair.depth_limits(self.source), "m"
 
-    def _map(self, name: str, low: float, high: float, unit: str, awaited: bool = False, **heading: str) -> Marks:
+    def _map(self, name: str, low: float, high: float, unit: str, awaited: bool = False, **heading: str) -> svg.Marks:
         """The map that is attached by that name, where it is shown, and below it what the hatching means."""
         if not self._has(name):
-            return NOTHING
+            return svg.NOTHING
         panel, size = self._image_panel(name), self.stage.left.intrinsics
-        mark = ring(panel.place(self.uv_left), "red", 5) if {"left", "right"} & set(self._panels.split()) else NOTHING
+        mark = ring(panel.place(self.uv_left), "red", 5) * bool({"left", "right"} & {*self._panels.split()})
         hatched = svg.text((panel.x, panel.y + panel.height + 18), "hatched: nothing found", "note")
         return heat_panel(panel, size.width, size.height, low, high, unit, mark, awaited=awaited, **heading) + hatched
 
@@ -259,7 +258,7 @@ class RectificationView(TurningPair):
         drawn: dict[str, Part] = {"disparity": self._map("disparity", *limits, "m", title="Depth"), "second": own}
         return drawn, images | dict.fromkeys(("disparity key", "second key"), heat_key("depth"))
 
-    def _wedge_panel(self) -> Marks:
+    def _wedge_panel(self) -> svg.Marks:
         farthest = stereo_pair.depth_limits(self.source)[1]
         notes = (self.equation(), self.interval())
         x, y, width, height = self._layout[_TILES["wedge"]]

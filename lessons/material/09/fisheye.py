@@ -17,7 +17,6 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.draw import plot, svg
 from camviz.draw.flow import WIDTH, Cell, rows, shortened
 from camviz.draw.items import Dots, Item, Line, axes_triad, closed
-from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, true_minus
@@ -196,7 +195,7 @@ class FisheyeView(OrbitView):
     def _panel(self) -> Panel:
         return image_in(self._layout["picture"], "fisheye", SIDE, SIDE)
 
-    def _picture_panel(self) -> Marks:
+    def _picture_panel(self) -> svg.Marks:
         panel = self._panel
         content = placed_image(panel, "fisheye", SIDE, SIDE)
         content += self._grid_lines(panel) if self.yours else self._beside(panel)
@@ -211,18 +210,18 @@ class FisheyeView(OrbitView):
         label = "The fisheye's picture; drag it, or press the arrow keys, to move the window; plus and minus zoom"
         return panel.show(content, title=title, hint="drag the window", drag="window", label=label)
 
-    def _window_panel(self) -> Marks:
+    def _window_panel(self) -> svg.Marks:
         panel = image_in(self._layout["window"], "cut", 320, 240)
         note = f"perspective, {self.hfov_deg:.0f}° wide"
         return panel.show(placed_image(panel, "window", 320, 240), title="The window cut out of it", note=note)
 
-    def _curves_panel(self) -> Marks:
+    def _curves_panel(self) -> svg.Marks:
         x, y, width, height = self._layout["curves"]
         around = x + 60, y + 34, width - 70, height - 82
         panel = plot.plot_panel("curves", *around, (0, 180), (-1.8 if self.yours else 0, _TOP))
         edge = SIDE / 2 / self.f
         drawn = plot.grid(panel) + plot.upright(panel, 90, "muted dashed")
-        drawn += svg.line(panel.place([(0, edge), (180, edge)]), "green dashed") if edge < _TOP else NOTHING
+        drawn += svg.line(panel.place([(0, edge), (180, edge)]), "green dashed") if edge < _TOP else svg.NOTHING
         names = sorted(LENSES, key=lambda name: name == self.projection) if not self.yours else [self.projection]
         for name in names:
             theta = np.linspace(0, _LAST[name], 181)
@@ -235,11 +234,11 @@ class FisheyeView(OrbitView):
             drawn, title="How far from the middle", note=EQUATIONS[self.projection]
         )
 
-    def _beside(self, panel: Panel) -> Marks:
+    def _beside(self, panel: Panel) -> svg.Marks:
         """The circle of the rays from beside the camera, where the picture has it."""
         c, r = (SIDE - 1) / 2, self.f * float(self.radius(np.array(pi / 2)))
         if not r < c:
-            return NOTHING
+            return svg.NOTHING
         turn = np.linspace(0, 2 * pi, 121)
         ring = panel.place(c + r * np.stack([np.cos(turn), np.sin(turn)], axis=-1))
         return on_photograph([ring], "yellow dashed") + svg.text(
@@ -254,7 +253,7 @@ class FisheyeView(OrbitView):
         uv, problem = answered(self.yours, (points, k.fx, k.cx, k.cy), points[..., :2])
         return np.where(np.abs(uv) < _FAR, uv, np.nan), problem
 
-    def _grid_lines(self, panel: Panel) -> Marks:
+    def _grid_lines(self, panel: Panel) -> svg.Marks:
         """Circles every 30° around the axis, and twelve lines out from it: where they land, and by the reader's own."""
         turn = np.linspace(0.01, 2 * pi + 0.01, 73)
         reach = np.radians(np.linspace(2, min(self.half_field_deg(), 150), 73))
@@ -267,7 +266,7 @@ class FisheyeView(OrbitView):
         right = svg.path(panel.place(self.camera.project(lines)), "yellow thin")
         return right + svg.path(panel.place(yours), "orange dashed")
 
-    def _your_curve(self, panel: Panel) -> Marks:
+    def _your_curve(self, panel: Panel) -> svg.Marks:
         """r/f by the reader's function, of rays to the right, and what the lines are."""
         theta = np.linspace(1, 179, 179)  # neither on the axis nor straight behind, where no direction is told
         entries = [(_COLOURS[self.projection], self.projection), ("orange dashed", "yours"), ("green dashed", "edge")]
@@ -289,7 +288,7 @@ class FisheyeView(OrbitView):
     def _weight(self, name: str) -> str:
         return "thick" if name == self.projection else "half"
 
-    def _name(self, panel: Panel, name: str) -> Marks:
+    def _name(self, panel: Panel, name: str) -> svg.Marks:
         places = {
             "perspective": (69, 2.95, "end"),
             "stereographic": (117, 2.95, ""),
@@ -330,7 +329,7 @@ class FisheyeView(OrbitView):
 
     # The numbers -----------------------------------------------------------------------------------------------------
 
-    def _numbers(self) -> Marks:
+    def _numbers(self) -> svg.Marks:
         x = self._layout["numbers"][0] + 10
         law = svg.text((x, 50), EQUATIONS[self.projection]) + svg.text((x, 70), f"f = {self.f:g} px")
         return svg.text((x, 26), "This lens", "title") + law + readout(self._told(), (x, 104), (0, 42), (0, 17))

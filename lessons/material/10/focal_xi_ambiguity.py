@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from camviz.cameras import Camera
 from camviz.draw import plot, svg
 from camviz.draw.flow import WIDTH, Tile
-from camviz.draw.marks import Marks
 from camviz.draw.panel import Panel
 from camviz.draw.picture import Picture
 from camviz.draw.shades import Shades, bar, contours, heat
@@ -97,14 +96,14 @@ def focal_xi_ambiguity_picture(
     return Picture(tuple(tiles), "The valley along f/(1 + ξ)", words, attached)
 
 
-def _line(panel: Panel, one: FocalXiAmbiguity) -> Marks:
+def _line(panel: Panel, one: FocalXiAmbiguity) -> svg.Marks:
     lens, pixels = one.camera.lens, one.camera.intrinsics
     f = pixels.fx / (1 + lens.xi) * (1 + one.xi)  # type: ignore[attr-defined]
     line = panel.place(np.stack([one.xi, f], axis=-1))
     return svg.line(line, "paper-line") + svg.line(line, "orange thick dashed")
 
 
-def _plus(at: np.ndarray) -> Marks:
+def _plus(at: np.ndarray) -> svg.Marks:
     ends = np.array([(-8, 0), (8, 0), (0, -8), (0, 8)]) + at
     pairs = ends[[0, 2]], ends[[1, 3]]
     return svg.segments(*pairs, "paper-line") + svg.segments(*pairs, "ink thick")

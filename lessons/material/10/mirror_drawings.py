@@ -10,7 +10,6 @@ import numpy as np
 from camviz.cameras import Intrinsics
 from camviz.draw import svg
 from camviz.draw.items import Item, Label, Line, TexturedMesh
-from camviz.draw.marks import Marks
 from camviz.draw.panel import Panel
 from camviz.draw.space import Dots
 from camviz.lenses.base import Array, unit
@@ -124,7 +123,7 @@ def _legs(camera: Catadioptric, xy: Array) -> Array:
 # Cut along the axis --------------------------------------------------------------------------------------------------
 
 
-def section(panel: Panel, camera: Catadioptric, towards_deg: float) -> Marks:
+def section(panel: Panel, camera: Catadioptric, towards_deg: float) -> svg.Marks:
     """The mirror cut along its axis, rays of nine pixels, their prolongations, and where neighbours of these cross.
 
     Millimetres across and, downwards, towards the camera. The orange ray comes from `towards_deg` off the axis.
@@ -145,7 +144,7 @@ def section(panel: Panel, camera: Catadioptric, towards_deg: float) -> Marks:
     )
 
 
-def _crossings(panel: Panel, camera: Catadioptric) -> Marks:
+def _crossings(panel: Panel, camera: Catadioptric) -> svg.Marks:
     """Where neighbouring rays cross: in one point, or along a caustic."""
     caustic = 1000 * camera.caustic(np.linspace(0.02, 0.985, 60) * camera.rim())
     if np.nanmax(np.ptp(caustic, axis=0)) > 1e-3:  # micrometres
@@ -158,7 +157,7 @@ def _crossings(panel: Panel, camera: Catadioptric) -> Marks:
 # The sphere ----------------------------------------------------------------------------------------------------------
 
 
-def sphere(panel: Panel, xi: float, rim_deg: float, towards_deg: float) -> Marks:
+def sphere(panel: Panel, xi: float, rim_deg: float, towards_deg: float) -> svg.Marks:
     """The unified sphere, cut: directions go to the sphere, and from there to a plane, seen from ξ above its centre."""
     turn = np.linspace(0, 2 * pi, 121)
     circle = np.stack([np.sin(turn), np.cos(turn)], axis=-1)

@@ -18,7 +18,6 @@ from camviz.cameras import Camera
 from camviz.draw import svg
 from camviz.draw.flow import WIDTH, Cell, rows, shortened
 from camviz.draw.items import closed
-from camviz.draw.marks import Marks
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, true_minus
@@ -269,7 +268,7 @@ class OmnidirectionalView(OrbitView):
     def _doughnut_box(self) -> Panel:
         return image_in(self._layout["doughnut"], "doughnut", _FINE, _FINE)
 
-    def _doughnut_panel(self) -> Marks:
+    def _doughnut_panel(self) -> svg.Marks:
         panel, camera = self._doughnut_box, self.camera(_FINE)
         frame, colour = self.window(), "yellow thick" if self.yours else "orange"
         outline = frame.unproject(frame.intrinsics.border(12))
@@ -292,13 +291,13 @@ class OmnidirectionalView(OrbitView):
             label="The doughnut picture; drag or press the arrow keys to turn the window",
         )
 
-    def _window_panel(self) -> Marks:
+    def _window_panel(self) -> svg.Marks:
         panel = image_in(self._layout["window"], "window", 320, 240)
         label = "The virtual pan-tilt-zoom window; drag or press the arrow keys to look around, + and - to zoom"
         seen = placed_image(panel, "window", 320, 240)
         return panel.show(seen, title="A window in it", hint="drag to look around", drag="window", label=label)
 
-    def _section_panel(self) -> Marks:
+    def _section_panel(self) -> svg.Marks:
         angle = degrees(np.arctan2(np.hypot(*self.looking[:2]), self.looking[2]))
         if self.model == "sphere" and self.central:
             panel = self._section_box(2.1, -1.9)
@@ -313,7 +312,7 @@ class OmnidirectionalView(OrbitView):
         half = (lowest - highest) * width / height / 2
         return Panel("section", x, y, width, height, -half, half, highest, lowest)
 
-    def _unrolled_panel(self) -> Marks:
+    def _unrolled_panel(self) -> svg.Marks:
         camera = self._unrolled(False)
         width, height = camera.intrinsics.width, camera.intrinsics.height
         panel = image_in(self._layout["unrolled"], "unrolled", width, height)
@@ -325,7 +324,7 @@ class OmnidirectionalView(OrbitView):
         title = "Unrolled: longitude and latitude" if self.unroll == "equirectangular" else "Folded out: a cube map"
         return panel.show(placed_image(panel, "unrolled", width, height) + svg.line(uv, "orange"), title=title)
 
-    def _numbers_panel(self) -> Marks:
+    def _numbers_panel(self) -> svg.Marks:
         x = self._layout["numbers"][0] + 10
         title = svg.text((x, 26), "This camera" if self._has("section") else "This window", "title")
         return title + readout(self._told(), (x, 50), (0, 38), (0, 17))
@@ -339,7 +338,7 @@ class OmnidirectionalView(OrbitView):
         uv = self.camera(_FINE).intrinsics.to_pixels(xy)
         return np.where(np.abs(uv) < 5 * _FINE, uv, np.nan), problem
 
-    def _grid_lines(self, panel: Panel) -> Marks:
+    def _grid_lines(self, panel: Panel) -> svg.Marks:
         """A square grid on level ground, and circles above it: where they land, and by the reader's function."""
         along = np.linspace(-4, 4, 61)
         across = [np.stack([along, 0 * along + _GROUND, 0 * along + z], axis=-1) for z in range(-4, 5, 2)]

@@ -12,7 +12,6 @@ import numpy as np
 
 from camviz.draw import plot, svg
 from camviz.draw.flow import Cell, rows
-from camviz.draw.marks import Marks
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, signed
@@ -134,7 +133,7 @@ class RingView(View):
         x, y, width, height = self._layout[name]
         return x + 10, y + 34, width - 20, height - 44
 
-    def _panorama_panel(self) -> Marks:
+    def _panorama_panel(self) -> svg.Marks:
         pixels = all_round(_FINE, _UP_DEG)
         panel = image_panel("panorama", 20, 34, 920, pixels.width, pixels.height)
         at = panel.place(np.stack([self._column(self.seams_deg), 0 * self.seams_deg], axis=-1))
@@ -161,7 +160,7 @@ class RingView(View):
         across = (96, 440) if self._slot("seam")[2] > 320 else (66, 300)
         return _detail(self.ring, self.stitched_m, self.seam_deg, self._coarse(across[not draft]))
 
-    def _seam_panel(self) -> Marks:
+    def _seam_panel(self) -> svg.Marks:
         panel = Panel("loupe", *self._slot("seam"), 0, 300, 0, 220)
         w, h = panel.width, panel.height
         seam = svg.join(svg.segments([(w / 2, y)], [(w / 2, y + 14)], "orange thick") for y in (0, h - 14))
@@ -169,7 +168,7 @@ class RingView(View):
         words = f"{there.removeprefix('at the seam ahead, ')}: {shift}"
         return panel.show(svg.image("loupe", 0, 0, w, h) + seam, title="At the seam ahead", note=words)
 
-    def _above_panel(self) -> Marks:
+    def _above_panel(self) -> svg.Marks:
         reach = 1.9
         panel = Panel("plan", *self._slot("above"), -reach, reach, reach * 0.88 + 0.9, -reach * 0.88 + 0.9)
         centres = self.ring.centres[:, ::2]
@@ -191,7 +190,7 @@ class RingView(View):
         drawn += svg.text(panel.place(post) + (-10 if side else 10, 4), "1.5 m", f"label red halo {side}")
         return panel.show(drawn, title="From above", note=f"{100 * self.ring.baseline:.1f} cm apart")
 
-    def _curve_panel(self) -> Marks:
+    def _curve_panel(self) -> svg.Marks:
         low, high = np.log10(0.7), np.log10(30)
         z = np.logspace(low, high, 161)
         px = self.parallax_px(z)

@@ -15,7 +15,6 @@ import numpy as np
 
 from camviz.draw import plot, svg
 from camviz.draw.flow import WIDTH, Cell, rows, shortened
-from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg, png
 from camviz.draw.readout import listed, readout, signed
@@ -137,7 +136,7 @@ class LightFieldView(RefocusedField):
         key = 60 if self.show == "slopes" else 0  # the room it takes
         return image_panel("picture", x, y, across - key, width, height, tallest=tallest)
 
-    def _picture_panel(self, attached: dict[str, bytes]) -> Marks:
+    def _picture_panel(self, attached: dict[str, bytes]) -> svg.Marks:
         panel, (height, width) = self._image_panel, self.views.shape[2:4]
         across = panel.place([(panel.left, self.row), (panel.right, self.row)])
         here = panel.place((self.column, self.row))
@@ -161,7 +160,7 @@ class LightFieldView(RefocusedField):
         far = float(self.light_field.depth(self.slope))
         return f"Focused at {metres(far)}" if far > 0 else "Focused by the slope"
 
-    def _row_handle(self, left_end: Array) -> Marks:
+    def _row_handle(self, left_end: Array) -> svg.Marks:
         grip = svg.rectangle(left_end[0], left_end[1] - 9, 16, 18, "paper half") + svg.polygon(
             left_end + np.array([(2, 0), (13, -8), (13, 8)]), "fill-yellow"
         )
@@ -174,7 +173,7 @@ class LightFieldView(RefocusedField):
         rows, height = self.views.shape[0], self.views.shape[2]
         return int(np.clip(round(self.row - self.slope_here * (self.v - (rows - 1) / 2)), 0, height - 1))
 
-    def _slice_panel(self) -> Marks:
+    def _slice_panel(self) -> svg.Marks:
         width, columns = self.views.shape[3], self.views.shape[1]
         x, y, across, height = self._slot("slice")
         panel = Panel("slice", x, y, across, height, -0.5, width - 0.5, -0.5, columns - 0.5)
@@ -201,7 +200,7 @@ class LightFieldView(RefocusedField):
         x, y, across, tallest = self._slot("views")
         return image_panel("views", x, y, across, columns * width, rows * height, tallest=tallest)
 
-    def _views_panel(self) -> Marks:
+    def _views_panel(self) -> svg.Marks:
         panel = self._mosaic_panel
         rows, columns = self.views.shape[:2]
         cell = np.array([panel.width / columns, panel.height / rows])
@@ -227,7 +226,7 @@ class LightFieldView(RefocusedField):
         down, across = self._window()
         return to_microlens_image(_bytes(self.light_field.views[:, :, down, across]))
 
-    def _sensor_panel(self) -> Marks:
+    def _sensor_panel(self) -> svg.Marks:
         down, across = self._window()
         x, y, width, _ = self._slot("sensor")
         edges = (across.start - 0.5, across.stop - 0.5, down.start - 0.5, down.stop - 0.5)
@@ -246,7 +245,7 @@ class LightFieldView(RefocusedField):
     def _plot(self) -> Panel:
         return plot.plot_panel("depth", *self._slot("depth"), self.limits, (1.0, 12.0))
 
-    def _depth_panel(self) -> Marks:
+    def _depth_panel(self) -> svg.Marks:
         panel, field = self._plot, self.light_field
         slopes = np.linspace(*self.limits, 139)
         within = lambda slope: (slope, np.clip(np.nan_to_num(field.depth(slope), nan=99), 1.3, 11.6))  # noqa: E731
@@ -260,17 +259,17 @@ class LightFieldView(RefocusedField):
         named = plot.axes(panel, "slope d, pixels a view", "depth, m")
         return named + panel.show(content, title="Slope is depth", note=self.equation(), drag="slope", label=label)
 
-    def _exact_range(self) -> Marks:
+    def _exact_range(self) -> svg.Marks:
         """The slopes at which no view is blurred by more than a pixel, where openings bound them."""
         panel, bound = self._plot, 1 / self.opening if self.opening else np.inf
         left, right = (float(np.clip(end, *self.limits)) for end in (-bound, bound))
         if (left, right) == self.limits:
-            return NOTHING
+            return svg.NOTHING
         x = panel.place([(left, panel.top), (right, panel.top)])[:, 0]
         words = svg.text((x.mean(), panel.height - 8), "exact: |d| ≤ 1 px", "note fill-ink middle")
         return svg.rectangle(x[0], 0, x[1] - x[0], panel.height, "wash fill-green") + words * (self.opening == 1)
 
-    def _numbers(self) -> Marks:
+    def _numbers(self) -> svg.Marks:
         x, y, _, _ = self._layout["numbers"]
         heading = svg.text((x + 10, y + 26), "This picture, and its light field", "title")
         return heading + readout(self._told(), (x + 10, y + 52), (0, 21), (145, 0))
@@ -289,15 +288,15 @@ class LightFieldView(RefocusedField):
     def _your_slope(self) -> float:
         return float(self._your_slopes[1][-1])
 
-    def _your_curve(self, panel: Panel) -> Marks:
+    def _your_curve(self, panel: Panel) -> svg.Marks:
         if not self.yours:
-            return NOTHING
+            return svg.NOTHING
         depths, slopes, _ = self._your_slopes
         lines = [("blue thick", "right"), ("orange dashed", "yours")]
         drawn = np.stack([np.clip(slopes[:-1], -99, 99), depths[:-1]], axis=-1)
         return svg.line(panel.place(drawn), "orange thick dashed") + plot.legend(panel, lines, "top right")
 
-    def _your_panel(self, attached: dict[str, bytes]) -> Marks:
+    def _your_panel(self, attached: dict[str, bytes]) -> svg.Marks:
         """The picture once more, sheared by the slope that the reader's function gives for the same depth."""
         x, y, across, tallest = self._slot("yours")
         height, width = self.views.shape[2:4]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from camviz.draw import svg
-from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel
 from camviz.lenses.base import Array
 
@@ -16,7 +15,7 @@ _PLACE, _PITCH = 14.0, 5.0  # between places of the aperture, and between microl
 _MIDDLE = _HEIGHT / 2
 
 
-def drawn(x: float, y: float, slope: float, shear: float, row: Array, chosen: int, opening: float = 0.0) -> Marks:
+def drawn(x: float, y: float, slope: float, shear: float, row: Array, chosen: int, opening: float = 0.0) -> svg.Marks:
     """The panel at (x, y): rays of a point that moves by `slope`, and the film that shearing by `shear` stands for.
 
     `row` (columns,) are the weights of the aperture's places, `chosen` one of them. At the microlenses, the ray through
@@ -40,10 +39,10 @@ def _conjugates(slope: float) -> tuple[float, float]:
     return _LENS_X - 1 / max(1 / _OBJECT + nearer, 1e-4), 1 / max(1 / _FILM - nearer, 1e-4)
 
 
-def _bundle(step: float, width: float, slope: float) -> Marks:
+def _bundle(step: float, width: float, slope: float) -> svg.Marks:
     """What comes through one opening, as wide as it is, and the opening itself."""
     if not width:
-        return NOTHING
+        return svg.NOTHING
     start, _ = _conjugates(slope)
     edges = step + np.array([-0.5, 0.5]) * width
     lens = [(_LENS_X, _MIDDLE + edge * _PLACE) for edge in edges]
@@ -52,7 +51,7 @@ def _bundle(step: float, width: float, slope: float) -> Marks:
     return light + svg.line(lens, "purple thick")
 
 
-def _rays(steps: np.ndarray, slope: float, row: Array, chosen: int) -> Marks:
+def _rays(steps: np.ndarray, slope: float, row: Array, chosen: int) -> svg.Marks:
     """From the point through every place of the lens to its microlens, and on to where they would meet."""
     start, meeting = _conjugates(slope)
     parts = []
@@ -61,17 +60,15 @@ def _rays(steps: np.ndarray, slope: float, row: Array, chosen: int) -> Marks:
         hit = (_LENS_X + _FILM, _MIDDLE + slope * step * _PITCH)
         colour = "blue" if step < 0 else "orange" if step > 0 else "ink"
         class_ = f"{'purple thick' if j == chosen else colour + ' thin'}{'' if weight else ' faint'}"
-        onward = (
-            svg.line([hit, (_LENS_X + meeting, _MIDDLE)], f"{class_} dotted half") if meeting > _FILM else svg.NOTHING
-        )
+        onward = svg.line([hit, (_LENS_X + meeting, _MIDDLE)], f"{class_} dotted half") * (meeting > _FILM)
         parts.append(
             (j == chosen, onward + svg.line([(start, _MIDDLE), lens, hit], class_) + svg.dots([hit], class_, 4))
         )
-    point = svg.dots([(start, _MIDDLE)], "ink", 8) if start > 6 else NOTHING
+    point = svg.dots([(start, _MIDDLE)], "ink", 8) if start > 6 else svg.NOTHING
     return svg.join(one for _, one in sorted(parts, key=lambda part: part[0])) + point
 
 
-def _camera(steps: np.ndarray) -> Marks:
+def _camera(steps: np.ndarray) -> svg.Marks:
     half = np.abs(steps).max(initial=0) * _PLACE + _PLACE / 2
     turn = np.linspace(-1, 1, 21)
     lens = np.stack([_LENS_X + 9 * np.sqrt(1 - turn**2), _MIDDLE + half * turn], axis=-1)
@@ -87,7 +84,7 @@ def _camera(steps: np.ndarray) -> Marks:
     return body + svg.line(bumps, "sky thin") + svg.line(sensor, "ink thick") + names
 
 
-def _film(shear: float) -> Marks:
+def _film(shear: float) -> svg.Marks:
     """Where a film would have to be to record what the shear sums: at F / (1 − d p / b)."""
     over = 1 - shear * _PITCH / _PLACE
     at = _LENS_X + _FILM / over if over > 0 else np.inf
@@ -98,6 +95,6 @@ def _film(shear: float) -> Marks:
     return svg.line([(at, 0), (at, _HEIGHT)], "red dashed") + names
 
 
-def _below_each_other(x: float, words: tuple[str, str], class_: str) -> Marks:
+def _below_each_other(x: float, words: tuple[str, str], class_: str) -> svg.Marks:
     """Two short lines at the foot, where one would lie on the sensor."""
     return svg.join(svg.text((x, y), line, class_) for y, line in zip((_HEIGHT - 24, _HEIGHT - 8), words, strict=True))

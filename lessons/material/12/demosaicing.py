@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from camviz import mosaics
 from camviz.draw import plot, svg
 from camviz.draw.flow import WIDTH, Cell, rows, shortened
-from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg, png
 from camviz.draw.readout import listed, readout, true_minus
@@ -204,7 +203,7 @@ class DemosaicingView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         photographs: dict[str, bytes] = {}
-        draw: dict[str, Callable[[], Marks]] = {
+        draw: dict[str, Callable[[], svg.Marks]] = {
             "picture": lambda: self._large_panel(photographs, draft),
             "yours": lambda: self._your_panel(photographs, draft),
             "loupe": lambda: self._loupe_panels(photographs),
@@ -233,7 +232,7 @@ class DemosaicingView(View):
         widest = _WIDE["picture"] - 20 - _KEY
         return image_panel("picture", 10, 34, widest, *self._size, tallest=widest)
 
-    def _large_panel(self, photographs: dict[str, bytes], draft: bool) -> Marks:
+    def _large_panel(self, photographs: dict[str, bytes], draft: bool) -> svg.Marks:
         marks, heading = self._predicted(), dict[str, Any]()
         if self._has("loupe"):
             label = "The picture; drag or press the arrow keys to move the loupe"
@@ -246,14 +245,14 @@ class DemosaicingView(View):
         return self._panel.show(placed_image(self._panel, "picture", *self._size) + marks, title=title, **heading)
 
     def _map_of_errors(
-        self, panel: Panel, error: NDArray, photographs: dict[str, bytes], draft: bool, marks: Marks, **heading: Any
-    ) -> Marks:
+        self, panel: Panel, error: NDArray, photographs: dict[str, bytes], draft: bool, marks: svg.Marks, **heading: Any
+    ) -> svg.Marks:
         coarse = cv2.resize(error, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) if draft else error
         photographs |= {panel.name: heat_map(coarse, 0, _WORST, "error"), f"{panel.name} key": heat_key("error")}
         heading = {"title": "What colour is false", **heading}
         return heat_panel(panel, *self._size, 0, _WORST, "ΔC", marks, **heading)
 
-    def _your_panel(self, photographs: dict[str, bytes], draft: bool) -> Marks:
+    def _your_panel(self, photographs: dict[str, bytes], draft: bool) -> svg.Marks:
         """The picture by the reader's function, or what is in the way of it."""
         (x, y), (pixels, problem) = self._corner("yours", 10, 34), self.your_picture
         panel, title = replace(self._panel, name="yours", x=x, y=y), "With your green"
@@ -268,22 +267,22 @@ class DemosaicingView(View):
         photographs["yours"] = jpeg(pixels, 90)
         return panel.show(placed_image(panel, "yours", *self._size) + self._predicted(), title=title)
 
-    def _predicted(self) -> Marks:
+    def _predicted(self) -> svg.Marks:
         """Rings on the zone plate where its frequency is one that the pattern takes for colour."""
         if self.frequency is None or self.panels == "picture":
-            return NOTHING
+            return svg.NOTHING
         size = self.truth.shape[0]
         places = (size - 1) / 2 + _everywhere(self.filters, self.highest) * size / (2 * self.highest)
         return _rings(self._panel.place(places), 9)
 
-    def _frame(self) -> Marks:
+    def _frame(self) -> svg.Marks:
         """The loupe's outline on the picture."""
         u, v = self.at
         left, top = u - LOUPE / 2 - 0.5, v - LOUPE / 2 - 0.5
         outline = self._panel.place(np.array([(0, 0), (LOUPE, 0), (LOUPE, LOUPE), (0, LOUPE)]) + (left, top))
         return svg.polygon(outline, "paper-line") + svg.polygon(outline, "blue thick")
 
-    def _loupe_panels(self, photographs: dict[str, bytes]) -> Marks:
+    def _loupe_panels(self, photographs: dict[str, bytes]) -> svg.Marks:
         u, v = self.at
         window = np.s_[v - LOUPE // 2 : v + LOUPE // 2, u - LOUPE // 2 : u + LOUPE // 2]
         filters = self.filters.cropped(u - LOUPE // 2, v - LOUPE // 2)
@@ -292,7 +291,7 @@ class DemosaicingView(View):
             "rebuilt": self.rebuilt[window],
             "truth": self.truth[window],
         }
-        body = NOTHING
+        body = svg.NOTHING
         for i, (name, pixels) in enumerate(seen.items()):
             panel = Panel(f"loupe {name}", *self._corner("loupe", 6, 34 + 102 * i), _SIDE, _SIDE, 0, 1, 0, 1)
             photographs[panel.name] = png(np.ascontiguousarray(pixels))
@@ -300,7 +299,7 @@ class DemosaicingView(View):
             body += panel.show(content, title=name)
         return body
 
-    def _spectrum_panel(self, photographs: dict[str, bytes]) -> Marks:
+    def _spectrum_panel(self, photographs: dict[str, bytes]) -> svg.Marks:
         x, y = self._corner("spectrum", 62, 34)
         panel = plot.plot_panel("spectrum", x, y, 148, 148, (-0.5, 0.5), (0.5, -0.5))
         photographs["spectrum"] = jpeg(mosaic_steps.spectrum(self.source, self.filters, self.spots_px))
@@ -357,7 +356,7 @@ def _everywhere(pattern: Pattern, highest: float) -> Array:
     return np.array(sorted(places), dtype=float).reshape(-1, 2)
 
 
-def _rings(centres: Array, radius: float) -> Marks:
+def _rings(centres: Array, radius: float) -> svg.Marks:
     lines = [centre + radius * circle(25) for centre in centres]
     return svg.path(lines, "paper-line") + svg.path(lines, "ink")
 

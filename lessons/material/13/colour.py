@@ -19,7 +19,6 @@ from camviz.colour.spaces import chromaticity, to_srgb, tristimulus
 from camviz.colour.temperature import temperature, xy_of_temperature
 from camviz.draw import plot, svg
 from camviz.draw.flow import WIDTH, Cell, rows, shortened
-from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, true_minus
@@ -191,7 +190,7 @@ class ColourView(View):
             matrix, problem = tried(self.yours, (balanced, target), matrix)
         return developed(raw, gains, matrix, encoded=self.gamma != "at the end"), problem
 
-    def _your_chart(self) -> Marks:
+    def _your_chart(self) -> svg.Marks:
         """The chart by the reader's function, or the right one, greyed, or what is wrong."""
         (rgb, problem), panel, title = self.your_chart, self._chart_panel("your chart"), "With your function"
         if problem:
@@ -240,7 +239,7 @@ class ColourView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         photographs: dict[str, bytes] = {}
         photograph = partial(self._photograph_panel, photographs, draft)
-        draw: dict[str, Callable[[], Marks]] = {
+        draw: dict[str, Callable[[], svg.Marks]] = {
             "chart": self._chart, "your chart": self._your_chart, "steps": self._steps, "figures": self._figures,
             "light": self._light_panel, "surface": self._surface_panel, "sensor": self._sensor_panel,
             "photograph": partial(photograph, "photograph"), "your photograph": partial(photograph, "your photograph"),
@@ -272,14 +271,14 @@ class ColourView(View):
         encoded = to_display(surfaces @ self.shot.raw_from_srgb.T) @ (self.correction * self.gains).T
         return np.clip(encoded + 0.5, 0, 255).astype(np.uint8)
 
-    def _light_panel(self) -> Marks:
+    def _light_panel(self) -> svg.Marks:
         panel = self._spectrum_panel("light", 108)
         lines = plot.grid(panel) + plot.curve(panel, spectra.WAVELENGTHS_NM, self.power, "ink")
         strip = swatches.rainbow(panel, self.power)
         note = self.light if self.light in LAMPS else ""
         return plot.axes(panel, "wavelength in nm", "power") + panel.show(strip + lines, title="The light", note=note)
 
-    def _surface_panel(self) -> Marks:
+    def _surface_panel(self) -> svg.Marks:
         panel = self._spectrum_panel("surface", 1.05)
         curves = zip(self.reflectances, ("blue", "orange dashed"), strict=False)
         lines = [plot.curve(panel, spectra.WAVELENGTHS_NM, one, class_) for one, class_ in curves]
@@ -288,7 +287,7 @@ class ColourView(View):
         content = plot.grid(panel) + svg.join(lines)
         return plot.axes(panel, "wavelength in nm", "reflected") + panel.show(content, title=title, note=note)
 
-    def _sensor_panel(self) -> Marks:
+    def _sensor_panel(self) -> svg.Marks:
         panel = self._spectrum_panel("sensor", 1.9 if self.camera == "CIE observer" else 1.1)
         channels = zip(self.shot.sensitivity.T, ("red thick", "green dashed", "blue"), strict=True)
         content = svg.join(plot.curve(panel, spectra.WAVELENGTHS_NM, one, class_) for one, class_ in channels)
@@ -303,35 +302,35 @@ class ColourView(View):
         x, y, *_ = self._layout[name]
         return Panel(name, x + 10, y + 34, 390, 252, 0, 6, 0, 4)
 
-    def _chart(self) -> Marks:
+    def _chart(self) -> svg.Marks:
         panel, label = self._chart_panel(), "Choose a patch of the chart: click it or press the arrow keys"
         shown = swatches.chart(panel, self.chart, self.shot.true_chart, self.errors, self.patch)
         heading = {"title": "The chart", "hint": "click a patch", "drag": "chart", "label": label}
         return panel.show(shown, **heading) + self._key(panel, self.errors)
 
-    def _key(self, panel: Panel, off: np.ndarray) -> Marks:
+    def _key(self, panel: Panel, off: np.ndarray) -> svg.Marks:
         key = f"Above: camera. Below: your eye.\nNumber: ΔE2000, {off.mean():.2f} on average"
         return svg.paragraph((panel.x, panel.y + panel.height + 18), key, panel.width)
 
-    def _photograph_panel(self, photographs: dict[str, bytes], draft: bool, name: str) -> Marks:
+    def _photograph_panel(self, photographs: dict[str, bytes], draft: bool, name: str) -> svg.Marks:
         """A photograph, which goes to those attached: the reader's own, or the right one, greyed, where it waits."""
         image, title = self.image(draft=draft), "Developed in the same way"
         if name != "photograph":
             raw = self._surfaces(_DRAFT if draft else _FINE) @ self.shot.raw_from_srgb.T
             (rgb, problem), title = self.your_way(raw), "With your function"
             if problem and not is_unwritten(problem):
-                return NOTHING
+                return svg.NOTHING
             image = faded(image) if problem else to_display(rgb)
         photographs[name] = jpeg(image)
         height, width = image.shape[:2]
         panel = image_in(self._layout[name], name, width, height)
         return panel.show(placed_image(panel, name, width, height), title=title)
 
-    def _figures(self) -> Marks:
+    def _figures(self) -> svg.Marks:
         x, y = self._layout["figures"][0] + 10, self._layout["figures"][1]
         return svg.text((x, y + 26), "In numbers", "title") + readout(self._told(), (x, y + 48), (0, 36), (0, 17))
 
-    def _steps(self) -> Marks:
+    def _steps(self) -> svg.Marks:
         """The chosen patch on its way through: a colour and its numbers for each step."""
         raw = self.shot.raw(self.reflectances)
         seen = to_srgb(balance.seen(self.power, self.reflectances))

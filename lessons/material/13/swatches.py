@@ -11,14 +11,13 @@ from camviz.colour.spaces import to_srgb
 from camviz.colour.spectra import WAVELENGTHS_NM, observer
 from camviz.draw import svg
 from camviz.draw.flow import Cell
-from camviz.draw.marks import Marks
 from camviz.draw.panel import Panel
 from camviz.scenes.light import to_display
 
 _MARGIN = 0.04  # of a patch, in black between the patches
 
 
-def chart(panel: Panel, rgb: np.ndarray, true_xyz: np.ndarray, errors: np.ndarray | None, chosen: int) -> Marks:
+def chart(panel: Panel, rgb: np.ndarray, true_xyz: np.ndarray, errors: np.ndarray | None, chosen: int) -> svg.Marks:
     """The chart's 24 patches: linear sRGB above left of each diagonal, the truth below right of it, ΔE if given."""
     estimates, truths = hexadecimal(rgb), hexadecimal(to_srgb(true_xyz))
     light = np.clip(rgb, 0, 1) @ (0.2126, 0.7152, 0.0722) > 0.179  # where black stands out more than white
@@ -41,7 +40,7 @@ def chart(panel: Panel, rgb: np.ndarray, true_xyz: np.ndarray, errors: np.ndarra
     )
 
 
-def steps(cell: Cell, colours: Mapping[str, np.ndarray]) -> Marks:
+def steps(cell: Cell, colours: Mapping[str, np.ndarray]) -> svg.Marks:
     """Swatches below each other, linear sRGB (1 or 2, 3) each: a step's colour or two, its name and its numbers."""
     parts = []
     for at, (name, rgb) in enumerate(colours.items()):
@@ -58,7 +57,7 @@ def steps(cell: Cell, colours: Mapping[str, np.ndarray]) -> Marks:
     return svg.join(parts)
 
 
-def rainbow(panel: Panel, power: np.ndarray) -> Marks:
+def rainbow(panel: Panel, power: np.ndarray) -> svg.Marks:
     """The area under a spectrum (81,) in the colours of its wavelengths, as near as a screen comes to them."""
     width = panel.width / (len(WAVELENGTHS_NM) - 1)
     bars = [

@@ -17,7 +17,6 @@ from camviz.cameras import Camera, Intrinsics
 from camviz.colour.spectra import ILLUMINANTS, WAVELENGTHS_NM, illuminant, sensitivities
 from camviz.draw import svg
 from camviz.draw.flow import Cell
-from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import axes, bars, between, curve, grid, legend, logarithmic, plot_panel
@@ -157,7 +156,7 @@ class ImageSensorView(View):
 
     def figure(self, *, draft: bool = False) -> Picture:
         width, photographs = SMALL if draft else LARGE, dict[str, bytes]()
-        draw: dict[str, Callable[[], Marks]] = {
+        draw: dict[str, Callable[[], svg.Marks]] = {
             "photograph": lambda: self._photograph(width, photographs),
             "efficiency": self._spectra,
             "electrons": self._electrons,
@@ -166,7 +165,7 @@ class ImageSensorView(View):
         }
         return self.tiled(self._layout, {name: draw[name]() for name in self._layout}, photographs)
 
-    def _photograph(self, width: int, photographs: dict[str, bytes]) -> Marks:
+    def _photograph(self, width: int, photographs: dict[str, bytes]) -> svg.Marks:
         photographs["photograph"] = jpeg(self.shot(width).picture, 92)
         panel = image_in(self._layout["photograph"], "photograph", width, width * 3 // 4)
         return panel.show(placed_image(panel, panel.name, width, width * 3 // 4), title="What becomes of it")
@@ -175,7 +174,7 @@ class ImageSensorView(View):
     def _layout(self) -> dict[str, Cell]:
         return in_rows(_SIZES, self._has)
 
-    def _spectra(self) -> Marks:
+    def _spectra(self) -> svg.Marks:
         left, top, *_ = self._layout["efficiency"]
         panel = plot_panel("efficiency", left + 64, top + 34, 426, 290, (380, 780), (0, 100))
         unfiltered = 100 * np.asarray(self.sensor.efficiency(WAVELENGTHS_NM))
@@ -196,7 +195,7 @@ class ImageSensorView(View):
             content, title="Quantum efficiency", note=_MODELS[self.model].camera
         )
 
-    def _electrons(self) -> Marks:
+    def _electrons(self) -> svg.Marks:
         """Electrons of each channel beside the full well and the threshold, on a logarithmic scale."""
         low, high = 0.0, float(np.log10(3 * _MOST_E))
         freed = dict(zip(("red", "green", "blue", "ink"), self.white_e, strict=True))
@@ -216,21 +215,21 @@ class ImageSensorView(View):
                 continue
             content += bars(panel, left, right, top[:1], f"{class_} dotted")
             content += svg.join(bars(panel, left, right, top[1:], c) for c in (f"wash fill-{class_}", class_))
-        content += self._in_words(panel, len(names)) if self.yours else NOTHING
+        content += self._in_words(panel, len(names)) if self.yours else svg.NOTHING
         floor_e = self.sensor.threshold_photons() * float(self.sensor.efficiency())
         ends = (("full well", ",.0f", self.full_well, "orange"), ("threshold", ".1f", floor_e, "purple"))
         for name, form, electrons, class_ in ends:
             y = float(panel.place((0, np.log10(max(electrons, 1))))[1])
             content += svg.line([(0, y), (panel.width, y)], f"{class_} dashed")
             content += svg.text((panel.width - 6, y - 6), f"{name} {electrons:{form}} e⁻", f"{class_} halo end")
-        problem = svg.paragraph((x + 66, y + 270), placeholder(self.your_e[1]), 344) if self.yours else NOTHING
+        problem = svg.paragraph((x + 66, y + 270), placeholder(self.your_e[1]), 344) if self.yours else svg.NOTHING
         return (
             problem
             + axes(panel, "pixels of a white wall", "electrons", xticks, yticks, aside=54)
             + panel.show(content, title="Electrons in a pixel", note=f"{self.exposure_ms:g} ms, f/4, {SCENE_LUX:g} lux")
         )
 
-    def _in_words(self, panel: Panel, bar: int) -> Marks:
+    def _in_words(self, panel: Panel, bar: int) -> svg.Marks:
         """The two counts in green light in their bars."""
         electrons, words = self.your_e[0], svg.NOTHING
         for i, (one, class_) in enumerate(((self.green_e, "tick"), (electrons, "orange"))):
@@ -239,12 +238,12 @@ class ImageSensorView(View):
                 words += svg.text(below, f"{float(f'{one:.3g}'):,.0f}", f"{class_} halo middle")
         return words
 
-    def _figures(self, tile: str) -> Marks:
+    def _figures(self, tile: str) -> svg.Marks:
         """The numbers of the sensor, with where they are from, or those of what it takes."""
         (x, y, *_), figures = self._layout[tile], self.numbers()
         of_sensor = {name: figures.pop(name) for name in ("efficiency with fill factor", "full well", "converter")}
         title, told = ("This sensor", of_sensor) if tile == "sensor" else ("Its picture", figures)
-        source = svg.paragraph((x + 10, y + 166), _MODELS[self.model].source, 250) if tile == "sensor" else NOTHING
+        source = svg.paragraph((x + 10, y + 166), _MODELS[self.model].source, 250) if tile == "sensor" else svg.NOTHING
         return svg.text((x + 10, y + 26), title, "title") + readout(told, (x + 10, y + 50), (0, 38), (0, 17)) + source
 
 

@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
 from camviz.draw.flow import WIDTH, Cell, rows, shortened
-from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_in, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.plot import axes, curve, grid, plot_panel, upright
@@ -155,7 +154,7 @@ class ReadoutView(View):
         if self._has("scene"):
             photographs["scene"] = jpeg(self.scene_now(*size))
         title = "The picture, as far as it is read" if self.time < 100 else "The picture"
-        draw: dict[str, Callable[[], Marks]] = {
+        draw: dict[str, Callable[[], svg.Marks]] = {
             "scene": lambda: self._photo("scene", "The scene at this moment", size, "moves on"),
             "picture": lambda: self._photo("picture", title, size),
             "numbers": self._numbers,
@@ -169,14 +168,14 @@ class ReadoutView(View):
     def _layout(self) -> dict[str, Cell]:
         return in_rows(_SIZES, lambda name: self._has("time" if name == "what happens" else name))
 
-    def _photo(self, name: str, title: str, size: tuple[int, int], note: str = "") -> Marks:
+    def _photo(self, name: str, title: str, size: tuple[int, int], note: str = "") -> svg.Marks:
         panel = image_in(self._layout[name], name, *size)
         place = panel.place((0, size[1] * self.time / 100 - 0.5))[1]
         marked = self.time < 100 and (self.rolling or name == "picture")
-        line = svg.line([(0, place), (panel.width, place)], "orange thick") if marked else NOTHING
+        line = svg.line([(0, place), (panel.width, place)], "orange thick") if marked else svg.NOTHING
         return panel.show(placed_image(panel, name, *size) + line, title=title, note=note)
 
-    def _buckets(self, whole: np.ndarray) -> Marks:
+    def _buckets(self, whole: np.ndarray) -> svg.Marks:
         """The sensor as 16 × 12 buckets, filled after the picture's brightness, at this moment of the read-out."""
         left, top, *_ = self._layout["charge"]
         panel = Panel("buckets", left + 10, top + 34, 310, 232, 0, 18.6, 0, 13.92)
@@ -185,7 +184,7 @@ class ReadoutView(View):
         title = "Bucket brigade: one amplifier" if self.readout == "CCD" else "An amplifier in each pixel"
         return panel.show(draw(panel, charge), title=title, note=f"{BUCKETS[0]} × {BUCKETS[1]} pixels")
 
-    def _brigade(self, panel: Panel, charge: Array) -> Marks:
+    def _brigade(self, panel: Panel, charge: Array) -> svg.Marks:
         """Rows move down into the register; the lowest was the picture's first, for a lens turns it upside down."""
         columns, rows = BUCKETS
         state = bucket_brigade(charge, round(columns * rows * self.time / 100))
@@ -195,7 +194,7 @@ class ReadoutView(View):
         arrow = svg.join(_arrow(panel, (0.62, 3 + 3 * i), (0.62, 5 + 3 * i)) for i in range(3))
         return bodies + amplifier + arrow
 
-    def _rows(self, panel: Panel, charge: Array) -> Marks:
+    def _rows(self, panel: Panel, charge: Array) -> svg.Marks:
         """Rows stay; one is selected, and all its columns are read at once."""
         row = min(int(BUCKETS[1] * self.time / 100), BUCKETS[1] - 1)
         left = charge.copy()
@@ -220,11 +219,11 @@ class ReadoutView(View):
         moved = 100 * dx / (1e3 * self.frame_s * self._clock.scale[0])
         return self.but(time=float(np.clip(self.time + moved, 0, 100)))
 
-    def _words(self) -> Marks:
+    def _words(self) -> svg.Marks:
         x, y, *_ = self._layout["what happens"]
         return svg.paragraph((x + 16, y + 30), placeholder(self.your_row_s[1]) or _WORDS[self.readout], 238, "label")
 
-    def _timing(self) -> Marks:
+    def _timing(self) -> svg.Marks:
         """When each row is exposed, and when it is read."""
         panel = self._clock
         rows = np.array([0.0, ROWS])
@@ -251,15 +250,15 @@ class ReadoutView(View):
         )
         return shown + axes(panel, "time [ms]", "row", yticks=_ROW_TICKS)
 
-    def _your_line(self, panel: Panel) -> Marks:
+    def _your_line(self, panel: Panel) -> svg.Marks:
         """When each row is read if the reader's row time is right."""
         if np.isnan(self.your_row_s[0]):
-            return NOTHING
+            return svg.NOTHING
         rows = np.linspace(0, ROWS, 13)
         marks = svg.dots(panel.place(np.stack([1e3 * self.your_row_s[0] * rows, rows], axis=-1)), "orange", 9)
         return marks + svg.text((panel.width - 8, 54), "dots: read, by your row time", "orange halo end")
 
-    def _numbers(self) -> Marks:
+    def _numbers(self) -> svg.Marks:
         x, y, *_ = self._layout["numbers"]
         figures = readout(self.numbers(), (x + 12, y + 50), (0, 39), (0, 18))
         return svg.text((x + 12, y + 26), "This read-out", "title") + figures
@@ -339,7 +338,7 @@ def _train_rows(way_m: Array, width: int, height: int) -> NDArray[np.float32]:
     return textured_scene().trace(origins, rays, spread=1 / camera.intrinsics.fx)[0]
 
 
-def _squares(panel: Panel, charge: Array, left: float, top: float) -> Marks:
+def _squares(panel: Panel, charge: Array, left: float, top: float) -> svg.Marks:
     """Buckets, and in each a square as large as its charge (rows, columns), 0…1."""
     rows, columns = charge.shape
     v, u = np.mgrid[:rows, :columns] + 0.5
@@ -352,7 +351,7 @@ def _squares(panel: Panel, charge: Array, left: float, top: float) -> Marks:
     return wells + svg.path((centres + filled * corners)[full], "fill-blue", closed=True)
 
 
-def _arrow(panel: Panel, start: tuple[float, float], end: tuple[float, float]) -> Marks:
+def _arrow(panel: Panel, start: tuple[float, float], end: tuple[float, float]) -> svg.Marks:
     a, b = panel.place([start, end])
     along = (b - a) / np.hypot(*(b - a))
     aside = np.array([-along[1], along[0]])

@@ -16,7 +16,7 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import plot, svg
 from camviz.draw.flow import WIDTH, Cell, rows, shortened
-from camviz.draw.marks import NOTHING, Inset, Marks
+from camviz.draw.marks import Inset
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, seconds
@@ -213,7 +213,7 @@ class PhotonTransferView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         pixels = 1500 if draft else 3000
         dn = self.image(draft=draft) if self._has("picture") or self._has("histogram") else np.zeros((1, 1))
-        draw: dict[str, Callable[[], Marks]] = {
+        draw: dict[str, Callable[[], svg.Marks]] = {
             "picture": self._picture_panel,
             "curve": lambda: self._transfer_panel(pixels),
             "key": self._legend,
@@ -252,7 +252,7 @@ class PhotonTransferView(View):
         scale = white if self.brighten else 2**self.bits - 1 - self.sensor.offset_dn
         return to_display((dn - self.sensor.offset_dn) / max(scale, 1e-9))
 
-    def _picture_panel(self) -> Marks:
+    def _picture_panel(self) -> svg.Marks:
         panel = image_panel("picture", *self._corner("picture", 10, 34), _WIDE["picture"] - 20, _WIDTH, _HEIGHT)
         left, top, right, bottom = (s * n for s, n in zip(_CARD, (_WIDTH, _HEIGHT) * 2, strict=True))
         shown = placed_image(panel, "camera", _WIDTH, _HEIGHT, image_rendering="pixelated")
@@ -260,7 +260,7 @@ class PhotonTransferView(View):
         note = "brightened" if self.brighten else "as recorded"
         return panel.show(shown, title=f"The garden in {seconds(self.exposure_s)}", note=note)
 
-    def _histogram_panel(self, dn: np.ndarray) -> Marks:
+    def _histogram_panel(self, dn: np.ndarray) -> svg.Marks:
         """How many pixels have which number: the whole picture, and the card alone."""
         top = min(2**self.bits, 2 ** int(np.ceil(np.log2(max(float(dn.max()) + 1, 16)))))
         edges = np.linspace(-0.5, top - 0.5, min(top, 128) + 1)
@@ -281,7 +281,7 @@ class PhotonTransferView(View):
         across, up = (log10(0.6 * one), log10(1.3 * 2**self.bits)), (log10(0.4 * one), log10(0.12 * 2**self.bits))
         return plot.plot_panel("transfer", *self._corner("curve", 64, 34), 338, 226, across, up)
 
-    def _transfer_panel(self, pixels: int) -> Marks:
+    def _transfer_panel(self, pixels: int) -> svg.Marks:
         panel = self._plot
         ticks = plot.logarithmic(panel.left, panel.right), plot.logarithmic(panel.bottom, panel.top)
         content = self._curves(panel) + self._points(panel, pixels)
@@ -291,7 +291,7 @@ class PhotonTransferView(View):
         names = "signal above the dark (DN)", "noise, σ (DN)"
         return plot.plotted(panel, content, *names, *ticks, title=f"Noise of {how}", **heading)
 
-    def _curves(self, panel: Panel) -> Marks:
+    def _curves(self, panel: Panel) -> svg.Marks:
         """Every kind of noise as a line of its own slope, and all together."""
         K = self.sensor.gain_dn_per_e
         signal = np.logspace(panel.left, panel.right, 40)
@@ -305,10 +305,10 @@ class PhotonTransferView(View):
         curves = svg.join(lines) + plot.curve(panel, np.log10(signal), np.log10(whole), "ink")
         return curves + self._your_curve(panel, signal / K)
 
-    def _your_curve(self, panel: Panel, electrons: np.ndarray) -> Marks:
+    def _your_curve(self, panel: Panel, electrons: np.ndarray) -> svg.Marks:
         """The reader's own noise over the signal, or what is wrong with the function."""
         if self.yours is None:
-            return NOTHING
+            return svg.NOTHING
         answer, problem = tried(self.yours, (electrons, self.read_noise_e, self.prnu / 100), electrons)
         if problem:
             return svg.paragraph((14, 24), placeholder(problem), panel.width - 28, "note halo")
@@ -320,7 +320,7 @@ class PhotonTransferView(View):
         """How each kind of noise is drawn; orange is the reader's where there is a function of theirs."""
         return _STYLES if self.yours is None else {**_STYLES, "photons": ("yellow dashed", "½")}
 
-    def _legend(self) -> Marks:
+    def _legend(self) -> svg.Marks:
         """Beside the curves: wherever it stood among them, some gain would lead one through it."""
         parts = self.parts(np.array([self.card_e]))
         styles = self._styles()
@@ -329,9 +329,9 @@ class PhotonTransferView(View):
         named += [("orange thick", "yours")] if self.yours else []
         lines = plot.legend(self._plot, [("ink", "all together"), *named])
         x, y = self._corner("key", 2, 34)
-        return Marks([Inset("", x, y, 214, 226, lines)])
+        return svg.Marks([Inset("", x, y, 214, 226, lines)])
 
-    def _points(self, panel: Panel, pixels: int) -> Marks:
+    def _points(self, panel: Panel, pixels: int) -> svg.Marks:
         """What frames of the card say, and the exposure of the picture."""
         signal, noise, _ = self.measured(pixels)
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -14,7 +14,6 @@ import numpy as np
 
 from camviz.draw import plot, svg
 from camviz.draw.flow import Cell, rows
-from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_in
 from camviz.draw.picture import Picture
 from camviz.draw.readout import listed, true_minus
@@ -126,7 +125,7 @@ class FaultLabView(ViewChooser):
         x, y, *_ = self._layout[tile]
         return x + right, y + down
 
-    def _headline(self) -> Marks:
+    def _headline(self) -> svg.Marks:
         told = {"error of the fit": "RMS of all residuals", "believes to be off by": "1σ, by its covariance",
                 "is off by": "against the true camera"}  # fmt: skip
         parts = []
@@ -142,10 +141,10 @@ class FaultLabView(ViewChooser):
         place = self._corner("numbers", 10, 32 + 72 * shown)
         return svg.join(parts) + svg.paragraph(place, words, 200, "label") + self._your_verdict()
 
-    def _your_verdict(self) -> Marks:
+    def _your_verdict(self) -> svg.Marks:
         """What the reader's triage says of all residuals together."""
         if self.verdict is None:
-            return NOTHING
+            return svg.NOTHING
         residuals = self.experiment.residuals.reshape(VIEWS, BOARD.rows, BOARD.columns, 2)
         answer, problem = tried(self.verdict, (residuals,), 0.0)
         x, y = self._corner("numbers", 10, 322)
@@ -165,7 +164,7 @@ class FaultLabView(ViewChooser):
         tallest = 1.15 * max(float(np.nanmax(self.experiment.errors)), 3 * self.noise)
         return plot.plot_panel("bars", *self._corner("bars", 58, 34), 232, 288, (0.5, VIEWS + 0.5), (0, tallest))
 
-    def _bars_panel(self) -> Marks:
+    def _bars_panel(self) -> svg.Marks:
         panel, errors = self._bars, self.experiment.errors
         x = np.arange(1, VIEWS + 1)
         content = plot.grid(panel, xticks=[])
@@ -179,17 +178,17 @@ class FaultLabView(ViewChooser):
         names = [(float(i), f"{i}") for i in x.tolist()]
         return shown + plot.axes(panel, "", "RMS [px]", xticks=names)
 
-    def _your_bars(self, panel: Panel, x: np.ndarray) -> Marks:
+    def _your_bars(self, panel: Panel, x: np.ndarray) -> svg.Marks:
         """The reader's own bars beside the right ones; each that lies above the panel ends at its edge."""
         if self.yours is None:
-            return NOTHING
+            return svg.NOTHING
         answer, problem = tried(self.yours, (self.experiment.residuals,), self.experiment.errors)
         if problem:
             return svg.paragraph((10, 18), placeholder(problem), panel.width - 20, "note halo")
         names = [("blue thick", "RMS of the view"), ("orange thick", "yours")]
         return plot.bars(panel, x, x + 0.38, answer, "fill-orange") + plot.legend(panel, names)
 
-    def _image_panel(self) -> Marks:
+    def _image_panel(self) -> svg.Marks:
         made, i = self.experiment, self.index
         k = made.camera.intrinsics
         panel = image_in(self._layout["residuals"], "picture", k.width, k.height)
@@ -209,14 +208,14 @@ class FaultLabView(ViewChooser):
         """How much longer arrows are than residuals: by the noise alone, so that a fault makes them grow."""
         return float(max(1, round(1.8 / self.noise) * 5))
 
-    def _estimates_panel(self) -> Marks:
+    def _estimates_panel(self) -> svg.Marks:
         estimates = self.experiment.estimates
         values = np.array(list(estimates.values()))
         reach = 1.15 * max(float(np.max(np.abs(values[:, 0]) + values[:, 1])), 3.0)
         x, top = self._corner("estimates", 46, 34)
         panel = Panel("estimates", x, top, 150, 26.0 * len(estimates) + 6, -reach, reach, 0, len(estimates) + 0.2)
         content = svg.line(panel.place([(0, 0), (0, panel.bottom)]), "ink")
-        beside = NOTHING
+        beside = svg.NOTHING
         for i, (name, (error, sigma)) in enumerate(estimates.items()):
             y, far = i + 0.6, abs(error) > _FAR * sigma
             class_ = "red" if far else "green"
@@ -235,7 +234,7 @@ class FaultLabView(ViewChooser):
         note = "In pixels; k1 and k2 at the corner. Red: more than 4σ off."
         return shown + beside + below + svg.paragraph((x - 36, panel.y + panel.height + 38), note, 310)
 
-    def _findings(self, draft: bool) -> list[Marks]:
+    def _findings(self, draft: bool) -> list[svg.Marks]:
         """What the clinic finds, a tile for each, the worst first."""
         (x, y), whole = self._corner("findings", 10, 26), _WIDE["findings"]
         room = whole - 20
@@ -259,7 +258,7 @@ class FaultLabView(ViewChooser):
             tiles[-1] += svg.text((x + width * (_MOST - 1), y), more, "note")
         return [head + tiles[0], *tiles[1:]]
 
-    def _finding(self, x: float, y: float, width: float, finding: Finding, count: int) -> Marks:
+    def _finding(self, x: float, y: float, width: float, finding: Finding, count: int) -> svg.Marks:
         times, colour = f" × {count}" if count > 1 else "", _COLOURS[finding.severity]
         return (
             svg.rectangle(x, y - 14, 4, 60 + 154 * _WIDE["findings"] / width / _MOST, f"fill-{colour}")

@@ -15,7 +15,6 @@ import numpy as np
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import plot, svg
 from camviz.draw.flow import Cell, rows
-from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout, seconds, signed
@@ -166,7 +165,7 @@ class ExposureView(View):
     def figure(self, *, draft: bool = False) -> Picture:
         recorded = self.recorded(draft=draft)
         figures = self.numbers()
-        draw: dict[str, Callable[[float], Marks]] = {
+        draw: dict[str, Callable[[float], svg.Marks]] = {
             "picture": self._picture_panel,
             "corner": self._corner_panel,
             "signal": lambda x: readout({name: figures[name] for name in _SIGNAL}, (x + 10, 48), (0, 42), (0, 18)),
@@ -182,13 +181,13 @@ class ExposureView(View):
     def _layout(self) -> dict[str, Cell]:
         return rows(*((high, {name: w for name, w in line.items() if self._has(name)}) for high, line in _ROWS))
 
-    def _picture_panel(self, left: float) -> Marks:
+    def _picture_panel(self, left: float) -> svg.Marks:
         panel = image_panel("picture", left + 10, 34, 420, _WIDTH, _HEIGHT)
         shown = placed_image(panel, "camera", _WIDTH, _HEIGHT, image_rendering="pixelated")
         note = f"f/{self.f_number:.3g}, {seconds(2.0**self.shutter_stops)}, ISO {100 * 2**self.iso:.0f}"
         return panel.show(shown, title="The picture", note=note)
 
-    def _histogram_panel(self, left: float, recorded: np.ndarray) -> Marks:
+    def _histogram_panel(self, left: float, recorded: np.ndarray) -> svg.Marks:
         """How many pixels are how many stops below white."""
         panel = plot.plot_panel("histogram", left + 66, 358, 444, 144, _STOPS, (0, 1.1))
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -202,7 +201,7 @@ class ExposureView(View):
         shown = panel.show(content + marks + words, title="Histogram")
         return shown + plot.axes(panel, "stops from white", "√ pixels", None, [(1.0, "most")])
 
-    def _stops_panel(self, left: float) -> Marks:
+    def _stops_panel(self, left: float) -> svg.Marks:
         """Light, aperture, shutter and gain as bars of stops that add up; all are 0 by the rule of the sunny 16."""
         aperture = 8 - float(exposure_value(self.f_number, 1.0))
         parts = {
@@ -229,14 +228,14 @@ class ExposureView(View):
         shown = panel.show(plot.grid(panel, ticks, []) + svg.join(drawn), title="Stops that add up")
         return shown + plot.axes(panel, "stops from the sunny 16 rule", "", ticks, names) + svg.join(values)
 
-    def _corner_panel(self, left: float) -> Marks:
+    def _corner_panel(self, left: float) -> svg.Marks:
         """The light towards the corner, by each cause and by the reader's function, or what is to be said of that."""
         panel = plot.plot_panel("corners", left + 62, 34, 226, 240, (0, _CORNER_MM), (0, 1.08))
         r = np.linspace(0, _CORNER_MM, 60)
         curves = plot.curve(panel, r, self.falloff(r, cos4=True, rim=False), "blue dashed")
         curves += plot.curve(panel, r, self.falloff(r, cos4=False, rim=True), "purple dashed")
         curves += plot.curve(panel, r, self.falloff(r), "ink thick")
-        points = NOTHING
+        points = svg.NOTHING
         if self.yours is not None:
             values, problem = tried(self.yours, (r[::3], FOCAL_MM), r[::3])
             places = panel.place(np.stack([r[::3], np.clip(values, -1, 3)], axis=-1))

@@ -15,7 +15,6 @@ import numpy as np
 
 from camviz.draw import plot, svg
 from camviz.draw.flow import Cell, rows, shortened
-from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, png
 from camviz.draw.readout import listed, readout
@@ -171,13 +170,13 @@ class SharpnessView(View):
         high = {"picture": 328, "curves": 406, "numbers": 356}
         return shortened(rows((max(high.values()), {name: w for name, w in _WIDE.items() if self._has(name)})), **high)
 
-    def _picture_panel(self, left: float) -> Marks:
+    def _picture_panel(self, left: float) -> svg.Marks:
         panel = image_panel("sensor", left + 10, 34, 380, *FIELD_UM)
         shown = placed_image(panel, "sensor", *FIELD_UM, image_rendering="pixelated")
         note = f"{FIELD_UM[0] / 1000:g} × {FIELD_UM[1] / 1000:g} mm of the sensor"
         return panel.show(shown, title="What the pixels record", note=note)
 
-    def _curves_panel(self, left: float) -> Marks:
+    def _curves_panel(self, left: float) -> svg.Marks:
         """The curves, and below them what is to be said of the reader's function."""
         deep = 198 if self.yours else 252
         panel = plot.plot_panel("curves", left + 60, 34, 270, deep, (0, TOP_PER_MM), (0, 1.08))
@@ -190,7 +189,7 @@ class SharpnessView(View):
         drawn = plot.plotted(panel, content, *names, title="Contrast that is left")
         return drawn + self._legend(left, deep + 94) + svg.paragraph((left + 40, 362), placeholder(problem), 290)
 
-    def _causes(self, panel: Panel, f: np.ndarray) -> Marks:
+    def _causes(self, panel: Panel, f: np.ndarray) -> svg.Marks:
         """What each cause alone leaves, and all of them."""
         alone = {
             "blue dashed": diffraction_transfer(f, self.f_number, self.wavelength()),
@@ -200,15 +199,15 @@ class SharpnessView(View):
         drawn = [plot.curve(panel, f, values, class_) for class_, values in alone.items()]
         return svg.join([*drawn, plot.curve(panel, f, self.system(f), "ink thick")])
 
-    def _colours(self, panel: Panel, f: np.ndarray) -> Marks:
+    def _colours(self, panel: Panel, f: np.ndarray) -> svg.Marks:
         return svg.join(plot.curve(panel, f, self.system(f, k), f"{_COLOURS[k]} thick") for k in (0, 2, 1))
 
-    def _half(self, panel: Panel) -> Marks:
+    def _half(self, panel: Panel) -> svg.Marks:
         f = self.mtf50_per_mm
         at = panel.place([(0, 0.5), (f, 0.5), (f, 0)])
         return svg.line(at, "yellow dashed") + svg.dots(at[1:2], "yellow", 9)
 
-    def _your_points(self, panel: Panel) -> tuple[Marks, str]:
+    def _your_points(self, panel: Panel) -> tuple[svg.Marks, str]:
         """The reader's MTF as orange points, or the line that says why there are none."""
         if self.yours is None:
             return svg.NOTHING, ""
@@ -217,20 +216,20 @@ class SharpnessView(View):
         points = panel.place(np.stack([f, np.clip(values, -1, 2)], axis=-1))
         return svg.line(points, "orange") + svg.dots(points, "orange", 6), problem
 
-    def _legend(self, left: float, top: float) -> Marks:
+    def _legend(self, left: float, top: float) -> svg.Marks:
         """Below the curves, where it stands in no curve's way."""
         entries = [("ink thick", "all together"), ("blue dashed", "diffraction")]
         entries += [("purple dashed", "defocus"), ("green dashed", "pixel")]
         if self.coloured:
             entries = [(f"{name} thick", name) for name in _COLOURS]
         entries += [("muted dotted", "Nyquist"), *([("orange thick", "yours")] if self.yours else [])]
-        drawn = NOTHING
+        drawn = svg.NOTHING
         for i, (class_, words) in enumerate(entries):
             x, y = left + 40 + 150 * (i % 2), top + 20 * (i // 2)
             drawn += svg.line([(x, y), (x + 20, y)], class_) + svg.text((x + 26, y + 4), words, "note")
         return drawn
 
-    def _numbers_column(self, left: float) -> Marks:
+    def _numbers_column(self, left: float) -> svg.Marks:
         column = readout(self.numbers(), (left + 10, 54), (0, 40), (0, 17))
         return svg.text((left + 10, 26), "This camera", "title") + column
 

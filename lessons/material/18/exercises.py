@@ -542,8 +542,8 @@ PRINCIPAL_POINT = Exercise(
     cases=_triangles,
     tolerance=1e-7,
     hints=(
-        "The line from one corner through the principal point stands at a right angle on the side opposite. Two such lines fix it.",
-        "(q1 − c) · (q2 − q3) = 0 says (q2 − q3) · c = (q2 − q3) · q1. A second corner gives a second row: solve both for c.",
+        "The line from one corner through c stands at a right angle on the side opposite. Two such lines fix c.",
+        "(q1 − c) · (q2 − q3) = 0 says (q2 − q3) · c = (q2 − q3) · q1. A second corner gives a second row. Solve both.",
         "`return np.linalg.solve(sides, [(q2 - q3) @ q1, ___])`, where `sides` has the rows q2 − q3 and q3 − q1",
     ),
     praise="It is the orthocentre: there the three altitudes of the triangle meet.",

@@ -10,7 +10,6 @@ import numpy as np
 from camviz.cameras import Camera
 from camviz.draw import svg
 from camviz.draw.flow import Cell, rows, shortened
-from camviz.draw.marks import Marks
 from camviz.draw.panel import image_panel, placed_image
 from camviz.draw.picture import Picture
 from camviz.draw.readout import decimal, listed, readout
@@ -114,7 +113,7 @@ class StaffView(View):
         high = {"picture": 329 + 30 * bool(self.yours), "numbers": 70 + 40 * len(self.numbers())}
         return shortened(rows((high["picture"], {name: w for name, w in _WIDE.items() if self._has(name)})), **high)
 
-    def _picture_panel(self, cell: Cell) -> Marks:
+    def _picture_panel(self, cell: Cell) -> svg.Marks:
         line = _PANEL.place([(_PANEL.left, self.horizon_row), (_PANEL.right, self.horizon_row)])
         content = placed_image(_PANEL, "house", WIDTH, HEIGHT) + marks.on_photograph([line], "yellow dashed")
         content += svg.text(line[0] + (8, -8), "horizon", "label halo") + _measured(self.door, "green", f"{DOOR:g} m")
@@ -126,12 +125,12 @@ class StaffView(View):
         shown = _PANEL.show(content, title=f"A staff of {self.staff_m:g} m, {self.distance_m:g} m away")
         return shown + svg.paragraph((_PANEL.x, _PANEL.y + _PANEL.height + 20), said, _PANEL.width)
 
-    def _numbers_column(self, cell: Cell) -> Marks:
+    def _numbers_column(self, cell: Cell) -> svg.Marks:
         column = readout(self.numbers(), (cell[0] + 10, 54), (0, 40), (0, 17))
         return svg.text((cell[0] + 10, 26), "Measured in the picture", "title") + column
 
 
-def _measured(ends: Array, colour: str, words: str, class_: str = "label") -> Marks:
+def _measured(ends: Array, colour: str, words: str, class_: str = "label") -> svg.Marks:
     """A line from foot to top (2, 2) in pixels with a dot at either end, and words on its right."""
     at = _PANEL.place(ends)
     aside, side = (-10, "end") if class_ == "orange" else (10, "")  # on the left where the picture soon ends

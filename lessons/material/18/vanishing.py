@@ -13,7 +13,6 @@ import numpy as np
 from camviz.cameras import Camera
 from camviz.draw import svg
 from camviz.draw.flow import Cell
-from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, placed_image
 from camviz.draw.picture import Picture
 from camviz.draw.readout import decimal, listed, readout
@@ -146,7 +145,7 @@ class VanishingView(View):
             top += high[name]
         return found
 
-    def _paper_panel(self, cell: Cell) -> Marks:
+    def _paper_panel(self, cell: Cell) -> svg.Marks:
         beyond, right = self._beyond()
         content = placed_image(PAPER, "house", WIDTH, HEIGHT) + self._horizon_line(right)
         yours, problem = self._your_points()
@@ -155,15 +154,15 @@ class VanishingView(View):
         shown = PAPER.show(content, title="The photograph on a sheet of paper", hint="drag the small dots")
         return shown + svg.paragraph((14, PAPER.y + PAPER.height + 20), words, PAPER.width - 10)
 
-    def _horizon_line(self, right: bool) -> Marks:
+    def _horizon_line(self, right: bool) -> svg.Marks:
         row, slope = self.horizon
         u = np.array([PAPER.left, PAPER.right])
         at = PAPER.place(np.stack([u, row + slope * (u - self._centre[0])], axis=-1))
         place, side = (at[1] + (-8, 18), "end") if right else (at[0] + (8, 18), "")
-        words = svg.text(place, "horizon", f"label halo {side}") if 0 < place[1] < PAPER.height - 4 else NOTHING
+        words = svg.text(place, "horizon", f"label halo {side}") if 0 < place[1] < PAPER.height - 4 else svg.NOTHING
         return marks.on_photograph([at], "yellow dashed") + words
 
-    def _prolonged(self, name: str) -> Marks:
+    def _prolonged(self, name: str) -> svg.Marks:
         """Both lines, thick on their edges, and thin from there to where they meet."""
         both, at, colour = self.lines[name], self.pixels[name], _COLOURS[name]
         middle = both.mean(axis=1)
@@ -172,7 +171,7 @@ class VanishingView(View):
         thick = marks.on_photograph(PAPER.place(both), f"{colour} thick") if np.isfinite(both).all() else svg.NOTHING
         return svg.segments(thin[:, 0], thin[:, 1], f"{colour} thin") + thick + svg.dots([PAPER.place(at)], colour, 12)
 
-    def _beyond(self) -> tuple[Marks, bool]:
+    def _beyond(self) -> tuple[svg.Marks, bool]:
         """At the paper's border, on which side a point lies beyond it, and whether the words are on the left alone."""
         drawn, lefts = svg.NOTHING, []
         for name in "xz":
@@ -198,17 +197,17 @@ class VanishingView(View):
             grips[name] = both + inwards * 30 / np.maximum(np.linalg.norm(inwards, axis=-1, keepdims=True), 240)
         return grips
 
-    def _handle(self, index: int) -> Marks:
+    def _handle(self, index: int) -> svg.Marks:
         name, colour = ("x", "blue") if index < 4 else ("z", "purple")
         at = PAPER.place(self._grips[name].reshape(4, 2)[index % 4])
         if not np.isfinite(at).all():
-            return NOTHING
-        hand = svg.disc(at, 13, "card", fill_opacity=0)
+            return svg.NOTHING
+        hand = svg.circle(at, 13, "card", fill_opacity=0)
         words = f"End {index % 2 + 1} of {colour} line {index // 2 % 2 + 1}; arrow keys move it by a pixel"
         dot = svg.dots([at], "paper-dot", 10) + svg.dots([at], colour, 7)
         return svg.handle(hand + dot, f"end{index}", words)
 
-    def _your_points(self) -> tuple[Marks, str]:
+    def _your_points(self) -> tuple[svg.Marks, str]:
         """Rings where the reader's function says that the lines meet, and the line that says why there are none."""
         drawn, said = svg.NOTHING, ""
         for name in "xz":
@@ -219,7 +218,7 @@ class VanishingView(View):
             drawn += marks.ring(at, "orange thick", 10) if (np.abs(at) < 2000).all() else svg.NOTHING
         return drawn, said
 
-    def _above_panel(self, cell: Cell) -> Marks:
+    def _above_panel(self, cell: Cell) -> svg.Marks:
         """The plane of the eye and the horizon: the eye, the picture as a line, and the two directions."""
         x, y, width, high = cell
         panel = Panel("above", x + 10, y + 34, width - 20, high - 60, -700, 700, -80, 1120)
@@ -240,7 +239,7 @@ class VanishingView(View):
         shown = panel.show(content, title="From above")
         return shown + svg.text((x + 14, panel.y + panel.height + 17), "across: picture; colours: walls", "note")
 
-    def _numbers_column(self, cell: Cell) -> Marks:
+    def _numbers_column(self, cell: Cell) -> svg.Marks:
         x, y, _, _ = cell
         column = readout(self.numbers(), (x + 10, y + 54), (0, 40), (0, 17))
         return svg.text((x + 10, y + 26), "From these lines", "title") + column

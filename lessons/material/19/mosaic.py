@@ -18,7 +18,6 @@ from camviz import twoview
 from camviz.cameras import Camera, Intrinsics
 from camviz.draw import svg
 from camviz.draw.flow import Cell, rows, shortened
-from camviz.draw.marks import NOTHING, Marks
 from camviz.draw.panel import Panel, image_panel, placed_image
 from camviz.draw.picture import Picture, jpeg
 from camviz.draw.readout import listed, readout
@@ -190,16 +189,16 @@ class MosaicView(View):
         below = {"first": 480.0, "second": 480.0} if self._has("pictures") else {}
         return shortened(rows((_HIGH["mosaic"], top), (_HIGH["first"], below)), **_HIGH)
 
-    def _mosaic(self) -> Marks:
+    def _mosaic(self) -> svg.Marks:
         panel = Panel("mosaic", 10, 34, 520, 520 * DOWN / ACROSS, LEFT, LEFT + ACROSS, TOP, TOP + DOWN)
         content = svg.image("mosaic", 0, 0, panel.width, panel.height)
-        content += self._marks(panel) if self._has("matches") else NOTHING
+        content += self._marks(panel) if self._has("matches") else svg.NOTHING
         problem = self.shown_H[1] or (NO_H if np.isnan(self.shown_H[0]).any() else "")
         content = svg.group(content, "awaited") if is_unwritten(problem) else content
         content += notice(panel, problem)
         return panel.show(content, title=f"Both pictures, joined by {'your' if self.yours else 'one'} H")
 
-    def _marks(self, panel: Panel) -> Marks:
+    def _marks(self, panel: Panel) -> svg.Marks:
         """A dot where the first picture has a match, and a line to it from where H takes the second one's pixel."""
         uv, to = self.matches
         ends = np.stack([panel.place(to), panel.place(warped(self.shown_H[0], uv))], axis=1)
@@ -222,12 +221,12 @@ def warped(H: Array, uv: Array) -> Array:
         return np.asarray(mapped[:, :2] / mapped[:, 2:])
 
 
-def notice(panel: Panel, problem: str) -> Marks:
+def notice(panel: Panel, problem: str) -> svg.Marks:
     """What is to be said of a reader's function over a photograph; nothing where all is well."""
     if is_unwritten(problem):
         return svg.text((panel.width / 2, 0.14 * panel.height), YOURS_HERE, "title halo middle")
     ground = svg.rectangle(8, 8, panel.width - 16, 60, "paper")
-    return ground + svg.paragraph((18, 28), problem, panel.width - 36) if problem else NOTHING
+    return ground + svg.paragraph((18, 28), problem, panel.width - 36) if problem else svg.NOTHING
 
 
 def in_sight(camera: Camera, points: Array) -> NDArray[np.bool_]:

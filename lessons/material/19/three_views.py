@@ -17,7 +17,6 @@ from camviz import twoview
 from camviz.cameras import Camera, Intrinsics, look_at, transform
 from camviz.draw import svg
 from camviz.draw.flow import Cell, rows, shortened
-from camviz.draw.marks import Marks
 from camviz.draw.panel import image_panel, placed_image
 from camviz.draw.picture import Picture
 from camviz.draw.readout import listed, readout
@@ -131,7 +130,7 @@ class ThreeViews(OrbitView):
         high = 44 + 0.75 * (across["picture"] - 20)
         return shortened(rows((max(high, 370), {name: across[name] for name in shown})), picture=high, space=high)
 
-    def _third_picture(self) -> Marks:
+    def _third_picture(self) -> svg.Marks:
         """Rings where the third picture has the points, and crosses where the chain of two pairs expects them."""
         panel = image_panel("third", 10, 34, self._layout["picture"][2] - 20, 640, 480)
         at = panel.place(true_scene().seen[2])
