@@ -6,9 +6,7 @@ axis, sign or argument, or a term less. A mutant that is accepted has to agree w
 
 import ast
 import itertools
-import warnings
 from copy import deepcopy
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -48,31 +46,22 @@ median mean, ceil floor, inv transpose, ones_like zeros_like, inf nan, pi e"""
 FUNCTIONS = dict(pair.split() for pair in PAIRS.split(",")) | dict(pair.split()[::-1] for pair in PAIRS.split(","))
 
 
-@dataclass(frozen=True)
-class Mutant:
-    """A changed function: its first changed line, as `ast.unparse` writes it, and all its code."""
-
-    change: str
-    source: str
-
-
 def mutants(code):
-    """Yield all mutants of a function's code, each once."""
+    """Yield the code of all mutants of a function, each once."""
     tree = ast.parse(code)
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef) and ast.get_docstring(node) is not None:
             node.body = node.body[1:]
-    original = ast.unparse(tree)
     parameters = [one.arg for one in next(n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)).args.args]
-    seen = {original}
+    seen = {ast.unparse(tree)}
     for owner, field, index, node in list(places(tree)):
         for other in changes(node, parameters):
             put(owner, field, index, other)
             source = ast.unparse(ast.fix_missing_locations(tree))
             put(owner, field, index, node)
-            if source not in seen and compiles(source):
+            if source not in seen:
                 seen.add(source)
-                yield Mutant(first_changed_line(original, source), source)
+                yield source
 
 
 def places(tree):
@@ -93,22 +82,6 @@ def put(owner, field, index, node):
         getattr(owner, field)[index] = node
 
 
-def compiles(source):
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", SyntaxWarning)
-            compile(source, "<mutant>", "exec")
-    except SyntaxError:
-        return False
-    return True
-
-
-def first_changed_line(before, after):
-    lines = after.splitlines()
-    pairs = itertools.zip_longest(before.splitlines(), lines)
-    return next((new or "").strip() for old, new in pairs if old != new)
-
-
 def changes(node, parameters):
     """Yield what may stand in a node's place."""
     if isinstance(node, ast.If | ast.For):
@@ -118,7 +91,9 @@ def changes(node, parameters):
     elif isinstance(node, ast.BinOp):
         if type(node.op) in OPERATORS:
             yield ast.BinOp(node.left, OPERATORS[type(node.op)](), node.right)
-        yield from (ast.BinOp(node.right, node.op, node.left), node.left, node.right, ast.UnaryOp(ast.USub(), node))
+        yield from (node.left, node.right, ast.UnaryOp(ast.USub(), node))
+        if not isinstance(node.op, ast.Add | ast.Mult):
+            yield ast.BinOp(node.right, node.op, node.left)
     elif isinstance(node, ast.Compare):
         (operator, *_), (limit, *_) = node.ops, node.comparators
         yield from (ast.Compare(node.left, [other()], [limit]) for other in COMPARISONS.get(type(operator), ()))
@@ -134,7 +109,7 @@ def changes(node, parameters):
         if node.attr == "T":
             yield node.value
     elif isinstance(node, ast.Call):
-        yield from node.args  # `np.abs(x)` becomes x
+        yield from (one for one in node.args if not isinstance(one, ast.Starred))  # `np.abs(x)` becomes x
         yield from (ast.Call(node.func, node.args, [k for k in node.keywords if k is not one]) for one in node.keywords)
         if len(node.args) > 1:
             yield ast.Call(node.func, [node.args[1], node.args[0], *node.args[2:]], node.keywords)
@@ -151,7 +126,7 @@ def f(x, k):
 
 
 def test_each_kind_of_slip_is_among_the_mutants():
-    made = {mutant.change for mutant in mutants(CODE)}
+    made = {line.strip() for source in mutants(CODE) for line in source.splitlines()}
     assert {
         "r = np.sqrt(x ** 2 - k)",
         "r = np.sqrt(x ** 2)",
@@ -160,8 +135,8 @@ def test_each_kind_of_slip_is_among_the_mutants():
         "r = x ** 2 + k",
         "r = np.sqrt(-(x ** 2 + k))",
         "return np.where(x >= 0, np.sum(r, axis=-1), x.T @ k)",
-        "return np.where(x > 0, np.sum(r), x.T @ k)",
         "return np.where(x > 0, np.mean(r, axis=-1), x.T @ k)",
+        "return np.where(x > 0, np.sum(r), x.T @ k)",
         "return np.where(x > 0, np.sum(r, axis=-1), x @ k)",
         "return np.where(x > 0, np.sum(r, axis=-1), k @ x.T)",
     } <= made
@@ -190,9 +165,18 @@ def accepted(one, function):
 
 
 def fresh_draws(one):
-    seeds = itertools.count(1000)
-    endless = itertools.chain.from_iterable(one.cases(np.random.default_rng(seed)) for seed in seeds)
-    return itertools.islice(endless, FRESH_DRAWS)
+    """Yield arguments that the checker does not draw; every second time their numbers are up to a third off, too."""
+    rng = np.random.default_rng(SEED)
+    endless = itertools.chain.from_iterable(one.cases(rng) for _ in itertools.count())
+    for number, case in enumerate(itertools.islice(endless, FRESH_DRAWS)):
+        yield tuple(stretched(value, rng) for value in case) if one.any_numbers and number % 2 else case
+
+
+def stretched(value, rng):
+    """Numbers times one factor. Matrices stay: most of them are no rotations, or no camera's, afterwards."""
+    matrix = np.shape(value)[-2:] in ((3, 3), (3, 4), (4, 4))
+    decimal = isinstance(value, float) or getattr(value, "dtype", None) == np.float64
+    return value * rng.uniform(0.75, 1.33) if decimal and not matrix else value
 
 
 @EACH
@@ -200,8 +184,8 @@ def test_a_mutant_is_refused_or_agrees_with_the_reference(one, thorough):
     every = list(mutants(solution_of(one)))
     budget = min(25 if thorough else 3, len(every))
     for number in np.random.default_rng(SEED).choice(len(every), budget, replace=False):
-        function = function_of(one, every[number].source)
-        assert not accepted(one, function) or agrees(one, function, fresh_draws(one)), every[number].change
+        function = function_of(one, every[number])
+        assert not accepted(one, function) or agrees(one, function, fresh_draws(one)), every[number]
 
 
 # Wrong answers that were accepted once --------------------------------------------------------------------------------
