@@ -239,7 +239,7 @@ def nanometres_taken_for_millimetres(focal_mm, wavelength_nm):
     return np.sqrt(2.44 * wavelength_nm * focal_mm)
 
 
-@BEST_HOLE.wrong("1.22 λ f / d is the *radius* of the Airy disc. d is a diameter: compare it with 2.44 λ f / d.")
+@BEST_HOLE.wrong("1.22 λ f / d is the *radius* of the Airy disc. Compare the diameter d with 2.44 λ f / d.")
 def radius_of_the_airy_disc(focal_mm, wavelength_nm):
     return np.sqrt(1.22 * wavelength_nm * 1e-6 * focal_mm)
 

@@ -433,7 +433,7 @@ def back_focal_distance(surfaces):
     return -M[0, 0] / M[1, 0]
 
 
-@ELEMENTS.wrong("A lens that makes it diverge has a *negative* focal length: keep the sign of −1/C.")
+@ELEMENTS.wrong("A lens that makes light diverge has a *negative* focal length: keep the sign of −1/C.")
 def always_positive(surfaces):
     return abs(effective_focal_length(surfaces))
 

@@ -242,9 +242,7 @@ def resized_in_single_precision(K, s):
     return small
 
 
-@RESIZED.wrong(
-    "The middle of a 640-pixel row, 319.5, becomes 159.75 when halved, but the middle of 320 pixels is 159.5."
-)
+@RESIZED.wrong("The middle of 640 pixels, 319.5, becomes 159.5 when halved. Your c′ lacks (s − 1)/2.")
 def without_the_half_pixel(K, s):
     return np.diag([s, s, 1.0]) @ K
 
@@ -261,7 +259,7 @@ def half_a_pixel_up(K, s):
     return np.array([[s, 0, (1 - s) / 2], [0, s, (1 - s) / 2], [0, 0, 1]]) @ K
 
 
-@RESIZED.wrong("You subtract the half pixel and forget that it was scaled too: it is s · (c + ½) − ½.")
+@RESIZED.wrong("The half pixel is scaled too: c′ = s · (c + ½) − ½.")
 def half_a_pixel_unscaled(K, s):
     return np.array([[s, 0, -0.5], [0, s, -0.5], [0, 0, 1]]) @ K
 
@@ -330,9 +328,7 @@ def binned_first(K, x0, y0, n):
     return _cropped(resized(K, 1 / n), x0, y0)
 
 
-@CROPPED_THEN_BINNED.wrong(
-    "The half-pixel term of binning is missing: the first n pixels have their middle at (n − 1)/2."
-)
+@CROPPED_THEN_BINNED.wrong("The half-pixel term is missing: the first n pixels have their middle at (n − 1)/2.")
 def binned_without_the_half_pixel(K, x0, y0, n):
     return np.diag([1 / n, 1 / n, 1]) @ _cropped(K, x0, y0)
 

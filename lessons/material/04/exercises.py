@@ -91,7 +91,7 @@ def the_vector_t(R, t):
     return t
 
 
-@CENTRE.wrong("This is −t in the *camera's* axes. Only where t lies on the axis of the turn is −t right by itself.")
+@CENTRE.wrong("This is −t, still in the *camera's* axes. Turn it into the world's.")
 def minus_t(R, t):
     return -t
 
@@ -164,7 +164,7 @@ def the_other_inverted(world_from_cam, world_from_board):
     return world_from_cam @ np.linalg.inv(world_from_board)
 
 
-@CHAIN.wrong("The transpose inverts its 3×3 rotation, but not the 4×4 matrix with its translation.")
+@CHAIN.wrong("The transpose inverts a 3×3 rotation, but not the 4×4 matrix with its translation.")
 def transposed_for_inverse(world_from_cam, world_from_board):
     return _transposed(world_from_cam) @ world_from_board
 
@@ -251,7 +251,7 @@ IS_ROTATION = Exercise(
 )
 
 
-@IS_ROTATION.wrong("`np.allclose` adds its `rtol`, 1e-5 unless told otherwise, to your `atol`: give it `rtol=0`.")
+@IS_ROTATION.wrong("`np.allclose` adds its `rtol`, 1e-5 by default, to your `atol`: give it `rtol=0`.")
 def with_the_relative_tolerance_left_on(M):
     return np.allclose(M.T @ M, np.eye(3), atol=1e-6) and abs(np.linalg.det(M) - 1) < 1e-6
 
@@ -353,7 +353,7 @@ def turned_by_the_old_rotation(T):
     return _assembled(_transposed(T[..., :3, :3]), -T[..., :3, :3] @ T[..., :3, 3:])
 
 
-@INVERT.wrong("The sign is missing: solving X' = R X + t for X *subtracts* t first, so the new translation is −Rᵀ t.")
+@INVERT.wrong("The sign is missing: the new translation is −Rᵀ t.")
 def without_the_minus(T):
     back = _transposed(T[..., :3, :3])
     return _assembled(back, back @ T[..., :3, 3:])

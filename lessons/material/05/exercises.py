@@ -279,18 +279,6 @@ UNDISTORT = Exercise(
 )
 
 
-def _kept(r, r_d, k1):
-    """r where it is below the fold and gives r_d, else NaN."""
-    return np.where((abs(r + k1 * r**3 - r_d) < 1e-9) & (r >= 0) & (r <= fold_radius(k1)), r, np.nan)
-
-
-def _newton(r_d, k1, steps):
-    r = np.asarray(r_d, dtype=float)
-    for _ in range(steps):
-        r = r - (r + k1 * r**3 - r_d) / (1 + 3 * k1 * r**2)
-    return r
-
-
 @UNDISTORT.right
 def by_the_cubic_formula(r_d, k1):
     """r³ + p r + q = 0 with p = 1/k1, q = -r_d/k1: Viète's cosine for k1 < 0, Cardano's roots for k1 > 0."""
@@ -325,7 +313,7 @@ def sign_flipped(r_d, k1):
     return np.asarray(r_d) * (1 - k1 * np.asarray(r_d) ** 2)
 
 
-@UNDISTORT.wrong("But dividing settles only while k1 r² is below 1. Take Newton's steps, and put the result back.")
+@UNDISTORT.wrong("Dividing settles only while k1 r² is below 1. Take Newton's steps, and put the result back.")
 def divided_without_a_look_back(r_d, k1):
     r = np.asarray(r_d, dtype=float)
     for _ in range(100):
@@ -335,7 +323,9 @@ def divided_without_a_look_back(r_d, k1):
 
 @UNDISTORT.wrong("Beyond the image you find a *negative* r, where no ray lies: keep only 0 … fold.")
 def negative_roots_kept(r_d, k1):
-    r = _newton(r_d, k1, 50)
+    r = np.asarray(r_d, dtype=float)
+    for _ in range(50):
+        r = r - (r + k1 * r**3 - r_d) / (1 + 3 * k1 * r**2)
     return np.where(abs(r + k1 * r**3 - r_d) < 1e-9, r, np.nan)
 
 
@@ -347,12 +337,12 @@ def five_divisions(r_d, k1):
     return r
 
 
-@UNDISTORT.wrong("For a strong pincushion, say r_d = 6 with k1 = 0.5, it never settles. Newton's steps do.")
+@UNDISTORT.wrong("For a strong pincushion, such as r_d = 6 with k1 = 0.5, dividing never settles. Newton's steps do.")
 def divided_and_looked_back(r_d, k1):
     r = np.asarray(r_d, dtype=float)
     for _ in range(100):
         r = r_d / (1 + k1 * r**2)
-    return _kept(r, r_d, k1)
+    return np.where(abs(r + k1 * r**3 - r_d) < 1e-9, r, np.nan)
 
 
 @UNDISTORT.wrong("Where no ray lands you answer with the fold. A clamped point looks like a real one: NaN.")

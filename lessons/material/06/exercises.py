@@ -324,7 +324,7 @@ _NO_ROTATION = (
     "rotation, which the SVD of [r₁ r₂ r₃] gives."
 )
 _V_FOR_VT = (
-    "NumPy's `svd` returns Vᵀ, not V: the nearest rotation is `U @ Vt` as it comes, and you transposed it once more. "
+    "NumPy's `svd` returns Vᵀ, not V: the nearest rotation is `U @ Vt`. You transposed `Vt` once more. "
     "For an exact H the difference may not show."
 )
 

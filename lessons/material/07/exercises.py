@@ -508,7 +508,7 @@ def of_one_sign(R, t, rays_left, rays_right):
     return np.prod(_distances(R, t, rays_left, rays_right), axis=-1) > 0
 
 
-@IN_FRONT.wrong("The sign of t is flipped: in λ R r_left + t = μ r_right, t goes to the other side as −t.")
+@IN_FRONT.wrong("The sign of t is wrong. In λ R r_left + t = μ r_right it moves across as −t.")
 def t_with_the_other_sign(R, t, rays_left, rays_right):
     return in_front(R, -t, rays_left, rays_right)
 

@@ -97,9 +97,7 @@ def point_by_point_as_a_list(points, f, cx, cy):
     return np.reshape(pixels, (*points.shape[:-1], 2)).tolist()
 
 
-@EQUIDISTANT.wrong(
-    "Points behind are mirrored: arctan(r / z) ends at 90° and comes back negative. Use np.arctan2(r, z)."
-)
+@EQUIDISTANT.wrong("Points behind are mirrored: arctan(r / z) ends at 90°. Use np.arctan2(r, z).")
 def mirrored(points, f, cx, cy):
     return f * _placed(points, _mirrored(points)) + (cx, cy)
 
