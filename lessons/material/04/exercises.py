@@ -164,6 +164,11 @@ def the_other_inverted(world_from_cam, world_from_board):
     return world_from_cam @ np.linalg.inv(world_from_board)
 
 
+@CHAIN.wrong("This is cam_from_world · board_from_world. You inverted both: the board's transform was right.")
+def both_inverted(world_from_cam, world_from_board):
+    return np.linalg.inv(world_from_cam) @ np.linalg.inv(world_from_board)
+
+
 @CHAIN.wrong("The transpose inverts a 3×3 rotation, but not the 4×4 matrix with its translation.")
 def transposed_for_inverse(world_from_cam, world_from_board):
     return _transposed(world_from_cam) @ world_from_board

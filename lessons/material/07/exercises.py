@@ -208,6 +208,16 @@ def zero_appended(F, uv_left):
     return line / np.linalg.norm(line[..., :2], axis=-1, keepdims=True)
 
 
+@LINE.wrong("u and v have changed places. A pixel is (column, row).")
+def rows_for_columns(F, uv_left):
+    return epipolar_line(F, uv_left[..., ::-1])
+
+
+@LINE.wrong("Your a and b have changed places, so your line runs along where the right one runs across.")
+def a_and_b_swapped(F, uv_left):
+    return epipolar_line(F, uv_left)[..., [1, 0, 2]]
+
+
 # 3: where all lines meet ---------------------------------------------------------------------------------------------
 
 
