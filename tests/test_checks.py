@@ -319,7 +319,7 @@ def test_the_fold_of_k1_minus_0_3_is_the_published_one_and_the_inverse_ends_ther
 @pytest.mark.parametrize(
     ("name", "function", "word"),
     [
-        ("05.fold_radius", lambda k1: 1 / np.sqrt(-3 * k1) if k1 <= 0 else np.inf, "divides by zero"),
+        ("05.fold_radius", lambda k1: 1 / np.sqrt(-3 * k1) if k1 <= 0 else np.inf, "gave -inf, where inf"),
         ("05.fold_radius", lambda k1: 1 / np.sqrt(-3 * k1) if k1 < 0 else 7.0, "gave 7, where inf"),
         ("05.distort", lambda xy, k1, k2, k3: exercise("05.distort").reference(xy, k1, k2, 0), "k3"),
         ("01.best_hole", lambda focal_mm, wavelength_nm: 1.56 * np.sqrt(focal_mm * wavelength_nm * 1e-6), "rounded"),

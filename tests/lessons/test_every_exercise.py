@@ -6,8 +6,7 @@ from copy import deepcopy
 
 import numpy as np
 import pytest
-from mutants import function_of, solution_of
-from test_exercises import ALL, EACH
+from test_exercises import ALL, EACH, function_of, solution_of
 
 from camviz_school.course.checks import judge
 from camviz_school.course.exercises import exercise

@@ -55,47 +55,14 @@ def zero_behind(points):
     return np.concatenate([points, np.zeros_like(points[..., :1])], axis=-1)
 
 
-@HOMOGENEOUS.wrong(
-    "You append a 1 once, to all the numbers in a row. Every point gets a 1 of its own: join along the last axis, "
-    "`axis=-1`."
-)
+@HOMOGENEOUS.wrong("You append one 1 to all numbers. Every point gets its own: join along the last axis, `axis=-1`.")
 def one_for_all(points):
     return np.append(points, 1.0)
 
 
-@HOMOGENEOUS.wrong(
-    "`np.hstack` joins along the second axis. That is the last one for a list of points, but not for one point or a "
-    "grid of points: join along the last axis, `axis=-1`."
-)
+@HOMOGENEOUS.wrong("`np.hstack` joins along the second axis. That is the last one only for a list of points.")
 def stacked_along_the_second_axis(points):
     return np.hstack([points, np.ones_like(points[..., :1])])
-
-
-@HOMOGENEOUS.wrong("You add one to each coordinate. The 1 is a coordinate of its own, behind the others.")
-def one_added(points):
-    return points + 1
-
-
-@HOMOGENEOUS.wrong("You divide by the last coordinate. That is the way *back* from homogeneous coordinates.")
-def divided(points):
-    return points / points[..., -1:]
-
-
-@HOMOGENEOUS.wrong("You put a 1 in place of the last coordinate. Nothing is to be lost: the 1 comes after it.")
-def last_replaced(points):
-    return np.concatenate([points[..., :-1], np.ones_like(points[..., :1])], axis=-1)
-
-
-@HOMOGENEOUS.wrong("You append the last coordinate once more. The number to append is 1.")
-def last_repeated(points):
-    return np.concatenate([points, points[..., -1:]], axis=-1)
-
-
-@HOMOGENEOUS.wrong(
-    "You append as many ones as there are coordinates. One is enough: `points[..., :1]` has a last axis of length 1."
-)
-def ones_for_each_coordinate(points):
-    return np.concatenate([points, np.ones_like(points)], axis=-1)
 
 
 EXERCISES = (HOMOGENEOUS,)

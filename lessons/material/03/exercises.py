@@ -75,19 +75,6 @@ def by_solving(uv, K):
 
 
 @RAY.right
-def from_the_last_row_upwards(uv, K):
-    y = (uv[..., 1] - K[1, 2]) / K[1, 1]
-    x = (uv[..., 0] - K[0, 2] - K[0, 1] * y) / K[0, 0]
-    return np.stack([x, y, np.ones_like(x)], axis=-1) / np.sqrt(x**2 + y**2 + 1)[..., None]
-
-
-@RAY.right
-def in_single_precision(uv, K):
-    towards = _append(uv, 1).astype(np.float32) @ np.linalg.inv(K).astype(np.float32).T
-    return towards / np.linalg.norm(towards, axis=-1, keepdims=True)
-
-
-@RAY.right
 def pixel_by_pixel(uv, K):
     rays = np.empty((*uv.shape[:-1], 3))
     for index in np.ndindex(uv.shape[:-1]):
@@ -101,50 +88,16 @@ def not_normalised(uv, K):
     return _append(uv, 1) @ np.linalg.inv(K).T
 
 
-@RAY.wrong(
-    "These are the rays for skew = 0: `(u − cx) / fx` alone is not enough when K[0, 1] is not zero. Solve "
-    "for y first, then take skew · y away from u."
-)
+@RAY.wrong("These are the rays for skew = 0. Solve for y first, then take skew · y away from u.")
 def skew_ignored(uv, K):
     straight = K.copy()
     straight[0, 1] = 0
     return ray(uv, straight)
 
 
-@RAY.wrong("You multiply by K. K takes rays to pixels; the way back is its inverse.")
-def not_inverted(uv, K):
-    return ray(uv, np.linalg.inv(K))
-
-
-@RAY.wrong(
-    "K is transposed on the way. K⁻¹ acts on columns; for points kept as rows, its transpose stands on their right."
-)
+@RAY.wrong("K is transposed. For points in rows, the transpose of K⁻¹ stands on their right.")
 def transpose_forgotten(uv, K):
     return ray(uv, K.T)
-
-
-@RAY.wrong("You append a 0 to the pixel. A pixel is a point, (u, v, *1*); with 0 the principal point drops out.")
-def zero_appended(uv, K):
-    return _unit(_append(uv, 0) @ np.linalg.inv(K).T)
-
-
-@RAY.wrong("You never take the principal point away. Rays count from the optical axis, and not from the first pixel.")
-def principal_point_forgotten(uv, K):
-    return ray(uv + K[:2, 2], K)
-
-
-@RAY.wrong("You divide rows by fx too. Heights of pixels are counted in fy.")
-def fx_for_both(uv, K):
-    square = K.copy()
-    square[1, 1] = K[0, 0]
-    return ray(uv, square)
-
-
-@RAY.wrong(
-    "(u − cx, v − cy, f) is a ray only where pixels are square and upright: one f cannot stand for both fx and fy."
-)
-def focal_length_as_depth(uv, K):
-    return _unit(_append(uv - K[:2, 2], K[0, 0]))
 
 
 @RAY.wrong("Skew multiplies y, the *direction*. You took skew · v away, with v still in pixels.")
@@ -154,33 +107,9 @@ def skew_times_the_row_in_pixels(uv, K):
     return _unit(np.stack([x, y, np.ones_like(x)], axis=-1))
 
 
-@RAY.wrong(
-    "You divide by one length for *all* rays together. Each ray has its own: take the norm over the last axis only."
-)
-def one_length_for_all(uv, K):
-    towards = _append(uv, 1) @ np.linalg.inv(K).T
-    return towards / np.linalg.norm(towards)
-
-
-@RAY.wrong("You divide by the *square* of the length. A unit vector comes of dividing by the length: take the root.")
-def divided_by_the_square(uv, K):
-    towards = _append(uv, 1) @ np.linalg.inv(K).T
-    return towards / np.sum(towards**2, axis=-1, keepdims=True)
-
-
-@RAY.wrong("These rays point backwards, away from what the pixels see: z must be positive.")
-def backwards(uv, K):
-    return -ray(uv, K)
-
-
 @RAY.wrong("Half a pixel was added. Here the centre of the first pixel is (0, 0), so u and v go in as they are.")
 def half_a_pixel_added(uv, K):
     return ray(uv + 0.5, K)
-
-
-@RAY.wrong("u and v have changed places: u, the column, comes first and belongs to x.")
-def row_first(uv, K):
-    return ray(uv[..., ::-1], K)
 
 
 # 2: the field of view ------------------------------------------------------------------------------------------------
@@ -229,14 +158,7 @@ def between_the_rays_of_the_edges(width, fx, cx):
     return np.degrees(np.arccos(a @ b / np.linalg.norm(a) / np.linalg.norm(b)))
 
 
-@FIELD_OF_VIEW.right
-def difference_of_two_directions(width, fx, cx):
-    return np.degrees(np.arctan2(width - 0.5 - cx, fx) - np.arctan2(-0.5 - cx, fx))
-
-
-@FIELD_OF_VIEW.wrong(
-    "This is 2 atan(width / 2f), which holds when the principal point is in the middle. Here it is not."
-)
+@FIELD_OF_VIEW.wrong("This is 2 atan(width / 2f), which holds when the principal point is in the middle.")
 def as_if_centred(width, fx, cx):
     return np.degrees(2 * np.arctan(width / (2 * fx)))
 
@@ -250,65 +172,22 @@ def counted_from_the_corner(width, fx, cx):
     return np.degrees(np.arctan(cx / fx) + np.arctan((width - cx) / fx))
 
 
-@FIELD_OF_VIEW.wrong(
-    "This is the angle between the *centres* of the first and the last pixel. The picture is half a pixel "
-    "wider on either side."
-)
+@FIELD_OF_VIEW.wrong("You measure between pixel *centres*. The picture is half a pixel wider on either side.")
 def between_pixel_centres(width, fx, cx):
     return np.degrees(np.arctan(cx / fx) + np.arctan((width - 1 - cx) / fx))
 
 
-@FIELD_OF_VIEW.wrong("The half pixel went the wrong way: the picture begins at −0.5, half a pixel *before* column 0.")
+@FIELD_OF_VIEW.wrong("The half pixel has the wrong sign: the picture begins at −0.5, half a pixel *before* column 0.")
 def half_a_pixel_inwards(width, fx, cx):
     return np.degrees(np.arctan((cx - 0.5) / fx) + np.arctan((width + 0.5 - cx) / fx))
 
 
-@FIELD_OF_VIEW.wrong("The angle is right, in radians.")
-def in_radians(width, fx, cx):
-    return np.radians(field_of_view(width, fx, cx))
-
-
-@FIELD_OF_VIEW.wrong(
-    "This is right while the principal point is in the picture. Outside it, both edges lie on one side of the axis: "
-    "one of the two angles is negative, and `abs` hides that."
-)
+@FIELD_OF_VIEW.wrong("With the principal point outside, one of the two angles is negative: leave out `abs`.")
 def absolute_values(width, fx, cx):
     return np.degrees(np.arctan(abs(cx + 0.5) / fx) + np.arctan(abs(width - 0.5 - cx) / fx))
 
 
-@FIELD_OF_VIEW.wrong("You doubled the angle to the left edge. The right edge is at another distance from the axis.")
-def left_side_twice(width, fx, cx):
-    return np.degrees(2 * np.arctan((cx + 0.5) / fx))
-
-
-@FIELD_OF_VIEW.wrong("You doubled the angle to the right edge. The left edge is at another distance from the axis.")
-def right_side_twice(width, fx, cx):
-    return np.degrees(2 * np.arctan((width - 0.5 - cx) / fx))
-
-
-@FIELD_OF_VIEW.wrong(
-    "This takes the whole width for one right-angled triangle, which is right only if the axis ends at an edge."
-)
-def one_triangle(width, fx, cx):
-    return np.degrees(np.arctan(width / fx))
-
-
-@FIELD_OF_VIEW.wrong("width / fx is an angle only while it is small. For wide views the arctangent matters.")
-def small_angles(width, fx, cx):
-    return np.degrees(width / fx)
-
-
-@FIELD_OF_VIEW.wrong("The quotients are upside down: the tangent is what lies *across* the axis, divided by fx.")
-def upside_down(width, fx, cx):
-    return np.degrees(np.arctan(fx / (cx + 0.5)) + np.arctan(fx / (width - 0.5 - cx)))
-
-
-@FIELD_OF_VIEW.wrong("This is half of it: you averaged the two angles, and the view is their sum.")
-def averaged(width, fx, cx):
-    return field_of_view(width, fx, cx) / 2
-
-
-@FIELD_OF_VIEW.wrong("You subtract the angles. The edges lie on either side of the axis, so the view is their sum.")
+@FIELD_OF_VIEW.wrong("You subtract the angles. The field of view is their sum.")
 def subtracted(width, fx, cx):
     return np.degrees(abs(np.arctan((cx + 0.5) / fx) - np.arctan((width - 0.5 - cx) / fx)))
 
@@ -331,12 +210,6 @@ def _resized_cases(rng: np.random.Generator) -> Iterator[Arguments]:
     for low, high in ((0.2, 0.4), (0.4, 0.8), (1.5, 3.0)):
         yield (_camera_matrix(rng), float(rng.uniform(low, high)))
     yield (_shifted_matrix(rng), float(rng.uniform(0.4, 0.8)))
-
-
-def _with_centre(K: Array, cx: float, cy: float) -> Array:
-    answer = K.copy()
-    answer[:2, 2] = cx, cy
-    return answer
 
 
 RESIZED = Exercise(
@@ -362,12 +235,6 @@ def distances_from_the_edge(K, s):
 
 
 @RESIZED.right
-def to_the_corner_and_back(K, s):
-    to_corner = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])
-    return np.linalg.inv(to_corner) @ np.diag([s, s, 1]) @ to_corner @ K
-
-
-@RESIZED.right
 def resized_in_single_precision(K, s):
     small = K.astype(np.float32)
     small[:2] *= np.float32(s)
@@ -375,10 +242,7 @@ def resized_in_single_precision(K, s):
     return small
 
 
-@RESIZED.wrong(
-    "This scales all of K's first two rows, c′ = s c. The middle of a 640-pixel row, 319.5, becomes 159.75 when "
-    "halved, but the middle of 320 pixels is 159.5: the principal point is off by (s − 1)/2 pixels."
-)
+@RESIZED.wrong("The middle of 640 pixels, 319.5, becomes 159.5 when halved. Your c′ lacks (s − 1)/2.")
 def without_the_half_pixel(K, s):
     return np.diag([s, s, 1.0]) @ K
 
@@ -395,66 +259,14 @@ def half_a_pixel_up(K, s):
     return np.array([[s, 0, (1 - s) / 2], [0, s, (1 - s) / 2], [0, 0, 1]]) @ K
 
 
-@RESIZED.wrong("The half-pixel term is there for columns only. Rows shrink as well.")
-def half_pixel_in_columns_only(K, s):
-    return np.array([[s, 0, (s - 1) / 2], [0, s, 0], [0, 0, 1]]) @ K
-
-
-@RESIZED.wrong("You subtract the half pixel and forget that it was scaled too: it is s · (c + ½) − ½.")
+@RESIZED.wrong("The half pixel is scaled too: c′ = s · (c + ½) − ½.")
 def half_a_pixel_unscaled(K, s):
     return np.array([[s, 0, -0.5], [0, s, -0.5], [0, 0, 1]]) @ K
 
 
-@RESIZED.wrong(
-    "This is the new distance from the *edge*, s · (c + ½). Column 0 lies half a pixel further in: subtract ½."
-)
+@RESIZED.wrong("This is the distance from the *edge*, s · (c + ½). Column 0 lies half a pixel further in.")
 def counted_from_the_edge(K, s):
     return np.array([[s, 0, s / 2], [0, s, s / 2], [0, 0, 1]]) @ K
-
-
-@RESIZED.wrong(
-    "You multiply *all* of K by s. Pixels are read off after dividing by the last number, so nothing changed."
-)
-def all_of_it_scaled(K, s):
-    return s * K
-
-
-@RESIZED.wrong(
-    "This is K as it came. K belongs to a picture and its pixels, not to the camera: fewer pixels, another K."
-)
-def unchanged(K, s):
-    return K
-
-
-@RESIZED.wrong("This is the way back: you divide by s. A picture with half as many columns has half the focal length.")
-def divided_by_the_factor(K, s):
-    return resized(K, 1 / s)
-
-
-@RESIZED.wrong(
-    "Only the principal point moves in yours. Focal lengths are counted in pixels, and these changed their size."
-)
-def focal_lengths_kept(K, s):
-    return _with_centre(K, s * K[0, 2] + (s - 1) / 2, s * K[1, 2] + (s - 1) / 2)
-
-
-@RESIZED.wrong("The half-pixel term belongs to the *places* cx and cy. Focal lengths are distances: they only scale.")
-def half_pixel_in_the_focal_lengths_too(K, s):
-    answer = resized(K, s)
-    answer[0, 0] += (s - 1) / 2
-    answer[1, 1] += (s - 1) / 2
-    return answer
-
-
-@RESIZED.wrong("The principal point is rounded to whole pixels. It is a place, not an index: keep its fraction.")
-def principal_point_rounded(K, s):
-    answer = resized(K, s)
-    return _with_centre(answer, np.round(answer[0, 2]), np.round(answer[1, 2]))
-
-
-@RESIZED.wrong("c′ = s (c + 1) − 1 keeps the pixel *before* the first in its place. What stays is the edge, at −½.")
-def a_whole_pixel_for_a_half(K, s):
-    return np.array([[s, 0, s - 1], [0, s, s - 1], [0, 0, 1]]) @ K
 
 
 # 4: crop, then bin ---------------------------------------------------------------------------------------------------
@@ -498,12 +310,6 @@ def entry_by_entry(K, x0, y0, n):
 
 
 @CROPPED_THEN_BINNED.right
-def from_the_middle_of_the_first_block(K, x0, y0, n):
-    middle = (n - 1) / 2
-    return np.array([[1 / n, 0, -(x0 + middle) / n], [0, 1 / n, -(y0 + middle) / n], [0, 0, 1]]) @ K
-
-
-@CROPPED_THEN_BINNED.right
 def in_place_and_in_single_precision(K, x0, y0, n):
     answer = K.astype(np.float32)
     answer[:2, 2] -= (x0, y0)
@@ -512,9 +318,7 @@ def in_place_and_in_single_precision(K, x0, y0, n):
     return answer
 
 
-@CROPPED_THEN_BINNED.wrong(
-    "The crop has the wrong sign. Columns cut off on the left bring the principal point *nearer* to column 0."
-)
+@CROPPED_THEN_BINNED.wrong("The crop has the wrong sign: subtract x0 and y0.")
 def crop_added(K, x0, y0, n):
     return resized(_cropped(K, -x0, -y0), 1 / n)
 
@@ -524,49 +328,12 @@ def binned_first(K, x0, y0, n):
     return _cropped(resized(K, 1 / n), x0, y0)
 
 
-@CROPPED_THEN_BINNED.wrong(
-    "The half-pixel term of the binning is missing: the middle of the first n pixels lies at (n − 1)/2."
-)
+@CROPPED_THEN_BINNED.wrong("The half-pixel term is missing: the first n pixels have their middle at (n − 1)/2.")
 def binned_without_the_half_pixel(K, x0, y0, n):
     return np.diag([1 / n, 1 / n, 1]) @ _cropped(K, x0, y0)
 
 
-@CROPPED_THEN_BINNED.wrong(
-    "This is K of the whole sensor. The pictures that are sent have other pixels, and so another K."
-)
-def whole_sensor(K, x0, y0, n):
-    return K
-
-
-@CROPPED_THEN_BINNED.wrong("Only the binning is there: the crop moves the principal point.")
-def only_binned(K, x0, y0, n):
-    return resized(K, 1 / n)
-
-
-@CROPPED_THEN_BINNED.wrong("Only the crop is there: n × n pixels become one, so everything counted in pixels shrinks.")
-def only_cropped(K, x0, y0, n):
-    return _cropped(K, x0, y0)
-
-
-@CROPPED_THEN_BINNED.wrong("You multiply by n. Binning leaves *fewer* pixels, each n times as wide: divide by n.")
-def multiplied_by_n(K, x0, y0, n):
-    return resized(_cropped(K, x0, y0), n)
-
-
-@CROPPED_THEN_BINNED.wrong("The half-pixel term has the wrong sign: with s = 1/n it is (s − 1)/2, which is negative.")
-def binned_with_the_half_pixel_up(K, x0, y0, n):
-    s = 1 / n
-    return np.array([[s, 0, (1 - s) / 2], [0, s, (1 - s) / 2], [0, 0, 1]]) @ _cropped(K, x0, y0)
-
-
-@CROPPED_THEN_BINNED.wrong("x0 and y0 have changed places: x0 counts columns, and cx is a column.")
-def x0_and_y0_swapped(K, x0, y0, n):
-    return resized(_cropped(K, y0, x0), 1 / n)
-
-
-@CROPPED_THEN_BINNED.wrong(
-    "The middle of the first block, (n − 1)/2, is in *small* pixels: subtract it before you divide by n."
-)
+@CROPPED_THEN_BINNED.wrong("(n − 1)/2 is in *small* pixels: subtract it before you divide by n.")
 def half_block_in_small_pixels(K, x0, y0, n):
     middle = (n - 1) / 2
     return np.array([[1 / n, 0, -middle], [0, 1 / n, -middle], [0, 0, 1]]) @ _cropped(K, x0, y0)
@@ -577,31 +344,6 @@ def skew_not_binned(K, x0, y0, n):
     answer = cropped_then_binned(K, x0, y0, n)
     answer[0, 1] = K[0, 1]
     return answer
-
-
-@CROPPED_THEN_BINNED.wrong(
-    "The principal point is right. fx, fy and skew are counted in pixels and must be divided by n."
-)
-def only_the_principal_point(K, x0, y0, n):
-    return _with_centre(K, *cropped_then_binned(K, x0, y0, n)[:2, 2])
-
-
-@CROPPED_THEN_BINNED.wrong(
-    "You divide by n², the number of pixels in a block. A length is divided by n, the block's width."
-)
-def divided_by_the_area(K, x0, y0, n):
-    return resized(_cropped(K, x0, y0), 1 / n**2)
-
-
-@CROPPED_THEN_BINNED.wrong(
-    "This is K · crop · bins, with the matrices on K's right. K ends in pixels, and what happens to pixels comes "
-    "after it: on its left."
-)
-def from_the_right(K, x0, y0, n):
-    s = 1 / n
-    crop = np.array([[1, 0, -x0], [0, 1, -y0], [0, 0, 1]])
-    bins = np.array([[s, 0, (s - 1) / 2], [0, s, (s - 1) / 2], [0, 0, 1]])
-    return K @ crop @ bins
 
 
 EXERCISES = (RAY, RESIZED, FIELD_OF_VIEW, CROPPED_THEN_BINNED)

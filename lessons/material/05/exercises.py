@@ -54,12 +54,6 @@ def as_opencv_does_it(xy, k1, k2, k3):
 
 
 @DISTORT.right
-def by_horner_s_scheme(xy, k1, k2, k3):
-    r2 = (xy[..., 0] ** 2 + xy[..., 1] ** 2)[..., None]
-    return xy * (((k3 * r2 + k2) * r2 + k1) * r2 + 1)
-
-
-@DISTORT.right
 def with_the_radius_itself(xy, k1, k2, k3):
     r = np.hypot(xy[..., 0], xy[..., 1])
     factor = 1 + k1 * r**2 + k2 * r**4 + k3 * r**6
@@ -70,11 +64,6 @@ def with_the_radius_itself(xy, k1, k2, k3):
 def powers_of_r(xy, k1, k2, k3):
     r = np.linalg.norm(xy, axis=-1, keepdims=True)
     return xy * (1 + k1 * r + k2 * r**2 + k3 * r**3)
-
-
-@DISTORT.wrong("This is what you get with k2 and k3 in each other's place: k2 goes with r⁴, k3 with r⁶.")
-def k2_and_k3_swapped(xy, k1, k2, k3):
-    return distort(xy, k1, k3, k2)
 
 
 @DISTORT.wrong("This is the displacement alone. The distorted point is x times (*1* + k1 r² + …).")
@@ -95,28 +84,6 @@ def signs_flipped(xy, k1, k2, k3):
 @DISTORT.wrong("Each coordinate is bent by its own square. The radius belongs to the point: r² = x² + y².")
 def each_coordinate_by_itself(xy, k1, k2, k3):
     return xy * (1 + k1 * xy**2 + k2 * xy**4 + k3 * xy**6)
-
-
-@DISTORT.wrong("The term k3 r⁶ is missing.")
-def two_terms(xy, k1, k2, k3):
-    return distort(xy, k1, k2, 0.0)
-
-
-@DISTORT.wrong("Your r² is the sum over *all* points. Each point has its own: sum over the last axis only.")
-def one_radius_for_all(xy, k1, k2, k3):
-    r2 = np.sum(xy**2)
-    return xy * (1 + k1 * r2 + k2 * r2**2 + k3 * r2**3)
-
-
-@DISTORT.wrong("The powers are r², r³ and r⁴ in yours. The polynomial has even powers only: r², r⁴ and r⁶.")
-def consecutive_powers(xy, k1, k2, k3):
-    r = np.linalg.norm(xy, axis=-1, keepdims=True)
-    return xy * (1 + k1 * r**2 + k2 * r**3 + k3 * r**4)
-
-
-@DISTORT.wrong("You return the factor. It still has to multiply the point: x times the factor, y times the factor.")
-def factor_alone(xy, k1, k2, k3):
-    return np.ones_like(xy) * (distort(xy, k1, k2, k3) / xy)
 
 
 # 2: find the bug in the tangential part ------------------------------------------------------------------------------
@@ -172,12 +139,12 @@ def multiplied_out(xy, p1, p2):
     return np.stack([2 * p1 * x * y + p2 * (3 * x * x + y * y), p1 * (x * x + 3 * y * y) + 2 * p2 * x * y], axis=-1)
 
 
-@TANGENTIAL.wrong("The first line is right now; the second still has `p2*x*y` where the equation has `2*p2*x*y`.")
+@TANGENTIAL.wrong("The first line is right now. The second still has `p2*x*y` in place of `2*p2*x*y`.")
 def only_the_first_line_mended(xy, p1, p2):
     return np.stack([tangential(xy, p1, p2)[..., 0], tangential_as_given(xy, p1, p2)[..., 1]], axis=-1)
 
 
-@TANGENTIAL.wrong("The second line is right now; the first still has `p1*x*y` where the equation has `2*p1*x*y`.")
+@TANGENTIAL.wrong("The second line is right now. The first still has `p1*x*y` in place of `2*p1*x*y`.")
 def only_the_second_line_mended(xy, p1, p2):
     return np.stack([tangential_as_given(xy, p1, p2)[..., 0], tangential(xy, p1, p2)[..., 1]], axis=-1)
 
@@ -192,37 +159,11 @@ def shifted_point(xy, p1, p2):
     return xy + tangential(xy, p1, p2)
 
 
-@TANGENTIAL.wrong("The mixed terms are right now, but `r2 + 2 * x**2` has lost its 2 in both lines.")
-def without_inner_twos(xy, p1, p2):
-    x, y = xy[..., 0], xy[..., 1]
-    r2 = x**2 + y**2
-    return np.stack([2 * p1 * x * y + p2 * (r2 + x**2), p1 * (r2 + y**2) + 2 * p2 * x * y], axis=-1)
-
-
-@TANGENTIAL.wrong("x and y have changed places inside the brackets: the horizontal shift has r² + 2*x*², not 2y².")
+@TANGENTIAL.wrong("x and y have changed places in the brackets: the horizontal shift has r² + 2*x*².")
 def squares_swapped(xy, p1, p2):
     x, y = xy[..., 0], xy[..., 1]
     r2 = x**2 + y**2
     return np.stack([2 * p1 * x * y + p2 * (r2 + 2 * y**2), p1 * (r2 + 2 * x**2) + 2 * p2 * x * y], axis=-1)
-
-
-@TANGENTIAL.wrong("The 2 belongs to the mixed terms only. You doubled everything.")
-def all_doubled(xy, p1, p2):
-    return 2 * tangential_as_given(xy, p1, p2)
-
-
-@TANGENTIAL.wrong("The shift is quadratic. In yours r stands where the equation has r².")
-def r_for_its_square(xy, p1, p2):
-    x, y = xy[..., 0], xy[..., 1]
-    r = np.sqrt(x**2 + y**2)
-    return np.stack([2 * p1 * x * y + p2 * (r + 2 * x**2), p1 * (r + 2 * y**2) + 2 * p2 * x * y], axis=-1)
-
-
-@TANGENTIAL.wrong("The mixed terms are gone altogether: 2 p1 x y in the first line, 2 p2 x y in the second.")
-def without_mixed_terms(xy, p1, p2):
-    x, y = xy[..., 0], xy[..., 1]
-    r2 = x**2 + y**2
-    return np.stack([p2 * (r2 + 2 * x**2), p1 * (r2 + 2 * y**2)], axis=-1)
 
 
 # 3: the fold ---------------------------------------------------------------------------------------------------------
@@ -266,7 +207,7 @@ def from_the_roots_of_the_slope(k1):
     return max(real) if len(real) else np.inf
 
 
-@FOLD.wrong("This is where r_d returns to *zero*, 1 + k1 r² = 0. The fold comes earlier, where the *slope* is zero.")
+@FOLD.wrong("This is where r_d returns to *zero*. The fold comes earlier, where the *slope* is zero.")
 def factor_zero(k1):
     return 1 / np.sqrt(-k1) if k1 < 0 else np.inf
 
@@ -276,19 +217,9 @@ def squared(k1):
     return -1 / (3 * k1) if k1 < 0 else np.inf
 
 
-@FOLD.wrong("For k1 < 0 this is right. With k1 > 0 the slope 1 + 3 k1 r² never vanishes: the fold is infinitely far.")
+@FOLD.wrong("With k1 > 0 the slope 1 + 3 k1 r² never vanishes: the fold is infinitely far.")
 def sign_ignored(k1):
     return 1 / np.sqrt(3 * abs(k1)) if k1 else np.inf
-
-
-@FOLD.wrong("For k1 < 0 this is right. Without a fold every radius is allowed: the answer is `np.inf`, not NaN.")
-def nan_without_a_fold(k1):
-    return 1 / np.sqrt(-3 * k1) if k1 < 0 else np.nan
-
-
-@FOLD.wrong("For k1 < 0 this is right. Without a fold every radius is allowed: the answer is `np.inf`, not 0.")
-def zero_without_a_fold(k1):
-    return 1 / np.sqrt(-3 * k1) if k1 < 0 else 0.0
 
 
 @FOLD.wrong("This is r_d at the fold, how far the image reaches. The question is at which r that happens.")
@@ -296,30 +227,9 @@ def reach_of_the_image(k1):
     return 2 / 3 / np.sqrt(-3 * k1) if k1 < 0 else np.inf
 
 
-@FOLD.wrong("This is the *angle* at which the ray folds, in degrees. Wanted is r, its tangent: a radius, not an angle.")
-def angle_in_degrees(k1):
-    return np.degrees(np.arctan(1 / np.sqrt(-3 * k1))) if k1 < 0 else np.inf
-
-
-@FOLD.wrong("This is the *angle* at which the ray folds, in radians. Wanted is r, its tangent: a radius, not an angle.")
+@FOLD.wrong("This is the *angle* at which the ray folds. Its tangent r is wanted.")
 def angle_in_radians(k1):
     return np.arctan(1 / np.sqrt(-3 * k1)) if k1 < 0 else np.inf
-
-
-@FOLD.wrong("The slope of r + k1 r³ is 1 + *3* k1 r²: differentiating r³ gives 3 r², yours has 2 r.")
-def wrong_power_rule(k1):
-    return -1 / (2 * k1) if k1 < 0 else np.inf
-
-
-@FOLD.wrong("The factor 1 + k1 r² has slope 2 k1 r. The curve that folds is r *times* that factor, r + k1 r³.")
-def two_for_three(k1):
-    return 1 / np.sqrt(-2 * k1) if k1 < 0 else np.inf
-
-
-@FOLD.wrong("For k1 < 0 this is right. For k1 = 0 it divides by zero: without distortion nothing folds, `np.inf`.")
-def minus_infinite_at_zero(k1):
-    with np.errstate(divide="ignore"):
-        return 1 / -np.sqrt(np.abs(-3 * k1)) if k1 == 0 else (1 / np.sqrt(-3 * k1) if k1 < 0 else np.inf)
 
 
 # 4: the inverse, for points ------------------------------------------------------------------------------------------
@@ -369,31 +279,6 @@ UNDISTORT = Exercise(
 )
 
 
-def _kept(r, r_d, k1):
-    """r where it is below the fold and gives r_d, else NaN."""
-    return np.where((abs(r + k1 * r**3 - r_d) < 1e-9) & (r >= 0) & (r <= fold_radius(k1)), r, np.nan)
-
-
-def _newton(r_d, k1, steps):
-    r = np.asarray(r_d, dtype=float)
-    for _ in range(steps):
-        r = r - (r + k1 * r**3 - r_d) / (1 + 3 * k1 * r**2)
-    return r
-
-
-@UNDISTORT.right
-def by_newton_from_r_d(r_d, k1):
-    return _kept(_newton(r_d, k1, 50), r_d, k1)
-
-
-@UNDISTORT.right
-def by_newton_from_where_the_picture_ends(r_d, k1):
-    r = np.minimum(r_d, 2 / 3 * fold_radius(k1)) + np.zeros_like(r_d)
-    for _ in range(100):
-        r = r - (r + k1 * r**3 - r_d) / (1 + 3 * k1 * r**2)
-    return _kept(r, r_d, k1)
-
-
 @UNDISTORT.right
 def by_the_cubic_formula(r_d, k1):
     """r³ + p r + q = 0 with p = 1/k1, q = -r_d/k1: Viète's cosine for k1 < 0, Cardano's roots for k1 > 0."""
@@ -418,9 +303,7 @@ def by_bisection(r_d, k1):
     return np.where(abs(low + k1 * low**3 - r_d) < 1e-9, low, np.nan)
 
 
-@UNDISTORT.wrong(
-    "One step of the iteration is not enough: put your result back through r + k1 r³ and look at what is left."
-)
+@UNDISTORT.wrong("One step of the iteration is not enough: put your result back through r + k1 r³.")
 def one_division(r_d, k1):
     return np.asarray(r_d) / (1 + k1 * np.asarray(r_d) ** 2)
 
@@ -430,16 +313,7 @@ def sign_flipped(r_d, k1):
     return np.asarray(r_d) * (1 - k1 * np.asarray(r_d) ** 2)
 
 
-@UNDISTORT.wrong("This distorts once more: the model runs the wrong way round.")
-def distorted_again(r_d, k1):
-    return r_d + k1 * r_d**3
-
-
-@UNDISTORT.wrong(
-    "Near the axis this is right. But dividing settles only while k1 r² is below 1, and ever more slowly towards the "
-    "fold. Beyond the image no ray lands, and there it never settles: take Newton's steps, put the result back into "
-    "r + k1 r³, and answer NaN where r_d does not come out."
-)
+@UNDISTORT.wrong("Dividing settles only while k1 r² is below 1. Take Newton's steps, and put the result back.")
 def divided_without_a_look_back(r_d, k1):
     r = np.asarray(r_d, dtype=float)
     for _ in range(100):
@@ -447,19 +321,15 @@ def divided_without_a_look_back(r_d, k1):
     return r
 
 
-@UNDISTORT.wrong(
-    "Beyond the image Newton's method finds a *negative* r. It does give r_d, but no ray lies there: keep only what "
-    "lies between 0 and the fold, and answer NaN for the rest."
-)
+@UNDISTORT.wrong("Beyond the image you find a *negative* r, where no ray lies: keep only 0 … fold.")
 def negative_roots_kept(r_d, k1):
-    r = _newton(r_d, k1, 50)
+    r = np.asarray(r_d, dtype=float)
+    for _ in range(50):
+        r = r - (r + k1 * r**3 - r_d) / (1 + 3 * k1 * r**2)
     return np.where(abs(r + k1 * r**3 - r_d) < 1e-9, r, np.nan)
 
 
-@UNDISTORT.wrong(
-    "Five rounds of dividing, which is what `cv2.undistortPoints` does unless it is told more. Iterate until nothing "
-    "changes, and look whether r_d comes out."
-)
+@UNDISTORT.wrong("Five rounds of dividing, as in `cv2.undistortPoints`, are too few. Iterate until nothing changes.")
 def five_divisions(r_d, k1):
     r = np.asarray(r_d, dtype=float)
     for _ in range(5):
@@ -467,79 +337,17 @@ def five_divisions(r_d, k1):
     return r
 
 
-@UNDISTORT.wrong(
-    "You divide again and again, and where that has not settled you answer NaN, though there is a point. For a strong "
-    "pincushion, say r_d = 6 with k1 = 0.5, it never settles. Near the fold it takes thousands of rounds, and "
-    "Newton's steps arrive in a dozen."
-)
+@UNDISTORT.wrong("For a strong pincushion, such as r_d = 6 with k1 = 0.5, dividing never settles. Newton's steps do.")
 def divided_and_looked_back(r_d, k1):
     r = np.asarray(r_d, dtype=float)
     for _ in range(100):
         r = r_d / (1 + k1 * r**2)
-    return _kept(r, r_d, k1)
+    return np.where(abs(r + k1 * r**3 - r_d) < 1e-9, r, np.nan)
 
 
-@UNDISTORT.wrong(
-    "Twenty rounds of dividing, and NaN where they have not arrived, though there is a point. Newton's steps arrive."
-)
-def twenty_divisions_and_a_look_back(r_d, k1):
-    r = np.asarray(r_d, dtype=float)
-    for _ in range(20):
-        r = r_d / (1 + k1 * r**2)
-    return _kept(r, r_d, k1)
-
-
-@UNDISTORT.wrong(
-    "Five steps of Newton's method are enough near the axis. Near the fold the slope is almost 0, and they have not "
-    "arrived; there you answer NaN, though there is a point: iterate until nothing changes."
-)
-def five_steps_of_newton(r_d, k1):
-    return _kept(_newton(r_d, k1, 5), r_d, k1)
-
-
-@UNDISTORT.wrong(
-    "Just below the fold you answer NaN. Rays land there, too: the limit is the fold itself, 1/sqrt(−3 k1), and no "
-    "part of it."
-)
-def nothing_beyond_nine_tenths_of_the_fold(r_d, k1):
-    r = undistort(r_d, k1)
-    return np.where(r <= 0.9 * fold_radius(k1), r, np.nan)
-
-
-@UNDISTORT.wrong("The centre of the picture has an answer, too: r_d = 0 comes from r = 0. Yours is NaN.")
-def nothing_in_the_centre(r_d, k1):
-    r = undistort(r_d, k1)
-    return np.where(r > 0, r, np.nan)
-
-
-@UNDISTORT.wrong("Two steps of Newton's method are not enough far from the axis: iterate until nothing changes.")
-def two_steps_of_newton(r_d, k1):
-    return _newton(r_d, k1, 2)
-
-
-@UNDISTORT.wrong(
-    "Where there is no such point you answer 0. That is a point, in the middle of the image. The answer is NaN."
-)
-def zero_for_no_point(r_d, k1):
-    return np.nan_to_num(undistort(r_d, k1))
-
-
-@UNDISTORT.wrong(
-    "Where no ray lands you answer with the fold itself. A clamped point looks like a real one: the answer is NaN."
-)
+@UNDISTORT.wrong("Where no ray lands you answer with the fold. A clamped point looks like a real one: NaN.")
 def clamped_to_the_fold(r_d, k1):
     return np.where(np.isnan(undistort(r_d, k1)), fold_radius(k1), undistort(r_d, k1))
-
-
-@UNDISTORT.wrong(
-    "The slope of r + k1 r³ is 1 + *3* k1 r². With 1 + k1 r² the steps have the wrong length, too short for k1 < 0 and "
-    "too long for k1 > 0, and four of them do not arrive. Where they have not, you answer NaN, though there is a point."
-)
-def wrong_slope(r_d, k1):
-    r = np.asarray(r_d, dtype=float)
-    for _ in range(4):
-        r = r - (r + k1 * r**3 - r_d) / (1 + k1 * r**2)
-    return _kept(r, r_d, k1)
 
 
 # 5: the map that straightens a photograph ----------------------------------------------------------------------------
@@ -601,10 +409,7 @@ def pixel_by_pixel(width, height, f, k1):
     return uv
 
 
-@UNDISTORT_MAP.wrong(
-    "You evaluated the *inverse* model. That map takes a pixel of the photograph to the straight image; to fill the "
-    "straight image you ask the other way round."
-)
+@UNDISTORT_MAP.wrong("You evaluated the *inverse* model. A pixel of the straight image asks the *forward* model.")
 def inverse_map(width, height, f, k1):
     def straighten(xy):
         r = np.linalg.norm(xy, axis=-1, keepdims=True)
@@ -613,37 +418,14 @@ def inverse_map(width, height, f, k1):
     return _map(width, height, f, straighten)
 
 
-@UNDISTORT_MAP.wrong(
-    "Rows and columns have changed places: an image array is indexed [v, u], so its shape is (height, width)."
-)
-def transposed(width, height, f, k1):
-    return undistort_map(width, height, f, k1).transpose(1, 0, 2)
-
-
-@UNDISTORT_MAP.wrong(
-    "Half a pixel off: pixels count from 0 to width − 1, so that their middle is (width − 1)/2, not width/2."
-)
+@UNDISTORT_MAP.wrong("Half a pixel off: pixels 0 … width − 1 have their middle at (width − 1)/2, not width/2.")
 def half_a_pixel_off(width, height, f, k1):
     return _map(width, height, f, lambda xy: distort(xy, k1, 0, 0), offset=0.5)
 
 
-@UNDISTORT_MAP.wrong("The sign of k1 is flipped. That is a rough *inverse*; here the model runs forwards, as it is.")
-def sign_of_k1_flipped(width, height, f, k1):
-    return undistort_map(width, height, f, -k1)
-
-
-@UNDISTORT_MAP.wrong(
-    "Your r is measured in pixels, in the hundreds for a real photograph, and k1 r² becomes enormous. k1 belongs to "
-    "normalised coordinates: divide by f before you bend, multiply by f after."
-)
+@UNDISTORT_MAP.wrong("Your r is measured in pixels. Divide by f before you bend, and multiply by f after.")
 def radius_in_pixels(width, height, f, k1):
     return _map(width, height, 1.0, lambda xy: distort(xy, k1, 0, 0))
-
-
-@UNDISTORT_MAP.wrong("These are normalised coordinates. Pixels are wanted: multiply by f and add the centre.")
-def still_normalised(width, height, f, k1):
-    centre = np.array([(width - 1) / 2, (height - 1) / 2])
-    return (undistort_map(width, height, f, k1) - centre) / f
 
 
 @UNDISTORT_MAP.wrong("The last axis holds (u, v), column first: `cv2.remap` reads it so. Yours has the row first.")
@@ -651,15 +433,7 @@ def row_first(width, height, f, k1):
     return undistort_map(width, height, f, k1)[..., ::-1]
 
 
-@UNDISTORT_MAP.wrong("The centre is never added back: the map points at the upper left pixel and beyond it.")
-def centre_not_added(width, height, f, k1):
-    return undistort_map(width, height, f, k1) - np.array([(width - 1) / 2, (height - 1) / 2])
-
-
-@UNDISTORT_MAP.wrong(
-    "The centre is never subtracted, so r is measured from the upper left pixel. The lens bends about the principal "
-    "point."
-)
+@UNDISTORT_MAP.wrong("You never subtract the centre. The lens bends about the principal point.")
 def bent_about_the_corner(width, height, f, k1):
     u, v = np.meshgrid(np.arange(width), np.arange(height))
     return f * distort(np.stack([u, v], axis=-1) / f, k1, 0, 0)

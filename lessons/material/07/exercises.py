@@ -103,35 +103,19 @@ def with_the_epipole_in_front(K_left, K_right, R, t):
 
 
 @FUNDAMENTAL.right
-def with_the_cross_product_behind_the_rotation(K_left, K_right, R, t):
-    """[t]× R = R [Rᵀ t]×."""
-    return np.linalg.solve(K_right.T, R @ cross_matrix(R.T @ t)) @ np.linalg.inv(K_left)
-
-
-@FUNDAMENTAL.right
 def column_by_column_and_with_the_other_sign(K_left, K_right, R, t):
     turned = (R @ np.linalg.inv(K_left)).T
     return np.linalg.inv(K_right).T @ np.column_stack([np.cross(column, t) for column in turned])
 
 
-@FUNDAMENTAL.wrong("The camera matrices have changed places: x_left stands on the right of F, so K_left⁻¹ does too.")
+@FUNDAMENTAL.wrong("The camera matrices have changed places: x_left stands on the right of F, as K_left⁻¹ does.")
 def cameras_swapped(K_left, K_right, R, t):
     return np.linalg.inv(K_left).T @ cross_matrix(t) @ R @ np.linalg.inv(K_right)
-
-
-@FUNDAMENTAL.wrong("This is E, which takes rays. Pixels become rays by the inverse camera matrices.")
-def essential_alone(K_left, K_right, R, t):
-    return cross_matrix(t) @ R
 
 
 @FUNDAMENTAL.wrong("This is the way from F to E. From E to F the camera matrices are *inverted*.")
 def camera_matrices_not_inverted(K_left, K_right, R, t):
     return K_right.T @ cross_matrix(t) @ R @ K_left
-
-
-@FUNDAMENTAL.wrong("R is transposed here: right_from_left turns a ray of the left camera into the right one's frame.")
-def rotation_transposed(K_left, K_right, R, t):
-    return fundamental(K_left, K_right, R.T, t)
 
 
 @FUNDAMENTAL.wrong("This is R [t]×. The translation comes after the rotation: E = [t]× R.")
@@ -144,29 +128,9 @@ def right_inverse_not_transposed(K_left, K_right, R, t):
     return np.linalg.inv(K_right) @ cross_matrix(t) @ R @ np.linalg.inv(K_left)
 
 
-@FUNDAMENTAL.wrong("You transposed both inverses. Only the right pixel is transposed in x_rightᵀ F x_left.")
-def both_inverses_transposed(K_left, K_right, R, t):
-    return np.linalg.inv(K_right).T @ cross_matrix(t) @ R @ np.linalg.inv(K_left).T
-
-
 @FUNDAMENTAL.wrong("You used the centre C = −Rᵀt in place of t. The two are in different frames.")
 def centre_for_t(K_left, K_right, R, t):
     return fundamental(K_left, K_right, R, -R.T @ t)
-
-
-@FUNDAMENTAL.wrong("K_left stands on both sides. The right pixel becomes a ray by the *right* camera's matrix.")
-def one_camera_for_both(K_left, K_right, R, t):
-    return fundamental(K_left, K_left, R, t)
-
-
-@FUNDAMENTAL.wrong("This is Fᵀ, which asks for x_leftᵀ … x_right. Here the right pixel stands first.")
-def from_right_to_left(K_left, K_right, R, t):
-    return fundamental(K_left, K_right, R, t).T
-
-
-@FUNDAMENTAL.wrong("R is missing: the left ray is still in the left camera's frame, and t is in the right one's.")
-def rotation_forgotten(K_left, K_right, R, t):
-    return fundamental(K_left, K_right, np.eye(3), t)
 
 
 # 2: the line of a point ----------------------------------------------------------------------------------------------
@@ -218,42 +182,24 @@ def as_opencv_has_them(F, uv_left):
 
 
 @LINE.right
-def number_by_number(F, uv_left):
-    u, v = np.moveaxis(uv_left, -1, 0)
-    a, b, c = (row[0] * u + row[1] * v + row[2] for row in F)
-    return np.stack([a, b, c], axis=-1) / np.hypot(a, b)[..., None]
-
-
-@LINE.right
 def with_the_other_sign(F, uv_left):
     line = -np.einsum("ij,...j->...i", F, _homogeneous(uv_left))
     return line / np.sqrt(line[..., :1] ** 2 + line[..., 1:2] ** 2)
 
 
-@LINE.wrong("This is Fᵀ x, the line in the *left* picture of a right point. (For rows, l = F x is `x @ F.T`.)")
+@LINE.wrong("This is Fᵀ x, the line in the *left* picture of a right point. For rows, F x is `x @ F.T`.")
 def transposed(F, uv_left):
     return epipolar_line(F.T, uv_left)
 
 
-@LINE.wrong("The line is right, but its scale is arbitrary: divide by √(a² + b²), so that a u + b v + c is in pixels.")
+@LINE.wrong("The line is right, but its scale is arbitrary: divide by √(a² + b²).")
 def not_scaled(F, uv_left):
     return _homogeneous(uv_left) @ F.T
 
 
-@LINE.wrong("You divide by the length of all three numbers. Only a and b make the direction: a² + b² = 1.")
+@LINE.wrong("You divide by the length of all three numbers. Only a and b count: a² + b² = 1.")
 def all_three_scaled(F, uv_left):
     return _unit(epipolar_line(F, uv_left))
-
-
-@LINE.wrong("u and v have changed places. A pixel is (column, row).")
-def rows_for_columns(F, uv_left):
-    return epipolar_line(F, uv_left[..., ::-1])
-
-
-@LINE.wrong("You divide by a² + b². It is its *root* that is the length.")
-def root_forgotten(F, uv_left):
-    line = _homogeneous(uv_left) @ F.T
-    return line / np.sum(line[..., :2] ** 2, axis=-1, keepdims=True)
 
 
 @LINE.wrong("You appended a 0. That is a direction, a point at infinity; a pixel is (u, v, 1).")
@@ -262,24 +208,9 @@ def zero_appended(F, uv_left):
     return line / np.linalg.norm(line[..., :2], axis=-1, keepdims=True)
 
 
-@LINE.wrong("You divide all lines by one length. Each line has its own: take the norm along the last axis only.")
-def one_length_for_all(F, uv_left):
-    line = _homogeneous(uv_left) @ F.T
-    return line / np.linalg.norm(line[..., :2])
-
-
-@LINE.wrong("Your lines have c = 1. That is a scale, but a u + b v + c is then no distance: make a² + b² = 1.")
-def last_number_one(F, uv_left):
-    line = _homogeneous(uv_left) @ F.T
-    return line / line[..., 2:]
-
-
-@LINE.wrong(
-    "For one point this is right. With points in rows, F x becomes `x @ F.T`, and so any number of them will do."
-)
-def only_for_one_point(F, uv_left):
-    line = F @ _homogeneous(uv_left)
-    return line / np.linalg.norm(line[..., :2], axis=-1, keepdims=True)
+@LINE.wrong("u and v have changed places. A pixel is (column, row).")
+def rows_for_columns(F, uv_left):
+    return epipolar_line(F, uv_left[..., ::-1])
 
 
 @LINE.wrong("Your a and b have changed places, so your line runs along where the right one runs across.")
@@ -335,13 +266,6 @@ def at_right_angles_to_the_columns(F):
     return e[:2] / e[2]
 
 
-@EPIPOLE.right
-def in_thousands_of_pixels(F):
-    D = np.diag([1e-3, 1e-3, 1])
-    e = np.linalg.inv(D) @ np.linalg.svd((np.linalg.inv(D) @ F).T)[2][-1]
-    return e[:2] / e[2]
-
-
 @EPIPOLE.wrong("This is the left epipole, F e = 0: the last row of Vt. The right one solves Fᵀ e = 0.")
 def left_epipole(F):
     return right_epipole(F.T)
@@ -353,44 +277,15 @@ def row_of_U(F):
     return e[:2] / e[2]
 
 
-@EPIPOLE.wrong(
-    "You took the last *column* of Vt. Its singular vectors are its rows, and they belong to the left picture."
-)
-def column_of_Vt(F):
-    e = np.linalg.svd(F)[2][:, 2]
-    return e[:2] / e[2]
-
-
 @EPIPOLE.wrong("The third number is not 1 yet: divide by it to get a pixel.")
 def not_divided(F):
     return np.linalg.svd(F)[0][:2, 2]
 
 
-@EPIPOLE.wrong("You return (u, v, 1). A pixel has two numbers here.")
-def still_homogeneous(F):
-    return np.append(right_epipole(F), 1.0)
-
-
-@EPIPOLE.wrong("You took the first column of U, which belongs to the *largest* singular value. The value 0 comes last.")
+@EPIPOLE.wrong("You took the first column of U, of the *largest* singular value. The value 0 comes last.")
 def largest_singular_value(F):
     e = np.linalg.svd(F)[0][:, 0]
     return e[:2] / e[2]
-
-
-@EPIPOLE.wrong("You took the second column of U. NumPy counts from 0: the third column is `2`.")
-def second_column(F):
-    e = np.linalg.svd(F)[0][:, 1]
-    return e[:2] / e[2]
-
-
-@EPIPOLE.wrong("u and v have changed places in what you return: a pixel is (column, row).")
-def row_before_column(F):
-    return right_epipole(F)[::-1]
-
-
-@EPIPOLE.wrong("This is a point of *one* line, that of the pixel (0, 0). The epipole lies on the lines of all pixels.")
-def end_of_one_line(F):
-    return np.array([-F[2, 2] / F[0, 2], 0.0])
 
 
 # 4: find the bug in the eight-point algorithm ------------------------------------------------------------------------
@@ -500,23 +395,6 @@ def as_opencv_does_it(uv_left, uv_right):
 
 
 @EIGHT_POINT.right
-def as_camviz_does_it(uv_left, uv_right):
-    from camviz import twoview
-
-    return twoview.eight_point(uv_left, uv_right)
-
-
-@EIGHT_POINT.right
-def by_mean_and_standard_deviation(uv_left, uv_right):
-    transforms = []
-    for uv in (uv_left, uv_right):
-        (mu, mv), (su, sv) = uv.mean(axis=0), uv.std(axis=0)
-        transforms.append(np.array([[1 / su, 0, -mu / su], [0, 1 / sv, -mv / sv], [0, 0, 1]]))
-    T_left, T_right = transforms
-    return T_right.T @ _linear(_moved(T_left, uv_left), _moved(T_right, uv_right)) @ T_left
-
-
-@EIGHT_POINT.right
 def with_one_transform_for_both_pictures(uv_left, uv_right):
     T = np.array([[1 / 300, 0, -320 / 300], [0, 1 / 300, -240 / 300], [0, 0, 1]])
     return T.T @ _linear(_moved(T, uv_left), _moved(T, uv_right)) @ T
@@ -539,9 +417,7 @@ def right_inverted(uv_left, uv_right):
     return np.linalg.inv(T_right) @ F @ T_left
 
 
-@EIGHT_POINT.wrong(
-    "You inverted both transforms. The moved points were *made* by T, and T itself appears in the product."
-)
+@EIGHT_POINT.wrong("You inverted both transforms. T itself made the moved points, and stands in the product.")
 def both_inverted(uv_left, uv_right):
     F, T_left, T_right = _with_transforms(uv_left, uv_right)
     return np.linalg.inv(T_right).T @ F @ np.linalg.inv(T_left)
@@ -553,46 +429,10 @@ def right_not_transposed(uv_left, uv_right):
     return T_right @ F @ T_left
 
 
-@EIGHT_POINT.wrong(
-    "You transposed both. Only the right pixel is transposed in x_rightᵀ F x_left, and so only T_right is."
-)
-def both_transposed(uv_left, uv_right):
-    F, T_left, T_right = _with_transforms(uv_left, uv_right)
-    return T_right.T @ F @ T_left.T
-
-
-@EIGHT_POINT.wrong("The left points are taken back to pixels. T_right is missing on the other side.")
-def right_forgotten(uv_left, uv_right):
-    F, T_left, _ = _with_transforms(uv_left, uv_right)
-    return F @ T_left
-
-
-@EIGHT_POINT.wrong("The right points are taken back to pixels. T_left is missing on the other side.")
-def left_forgotten(uv_left, uv_right):
-    F, _, T_right = _with_transforms(uv_left, uv_right)
-    return T_right.T @ F
-
-
-@EIGHT_POINT.wrong("T_left stands on both sides. The right points were moved by a transform of their own.")
+@EIGHT_POINT.wrong("T_left stands on both sides. The right points have a transform of their own.")
 def left_transform_twice(uv_left, uv_right):
     F, T_left, _ = _with_transforms(uv_left, uv_right)
     return T_left.T @ F @ T_left
-
-
-@EIGHT_POINT.wrong("This is Fᵀ: it leads from the right picture to the left one. F is to stand in x_rightᵀ F x_left.")
-def from_right_to_left_again(uv_left, uv_right):
-    return eight_point(uv_left, uv_right).T
-
-
-@EIGHT_POINT.wrong("The last line is right now; but you gave `linear_fundamental` the right points first.")
-def points_swapped(uv_left, uv_right):
-    T_left, T_right = _normaliser(uv_left), _normaliser(uv_right)
-    return T_right.T @ _linear(_moved(T_right, uv_right), _moved(T_left, uv_left)) @ T_left
-
-
-@EIGHT_POINT.wrong(_NOT_NORMALISED)
-def not_normalised(uv_left, uv_right):
-    return _linear(uv_left, uv_right)
 
 
 # 5: in front of both -------------------------------------------------------------------------------------------------
@@ -649,16 +489,6 @@ IN_FRONT = Exercise(
 
 
 @IN_FRONT.right
-def by_dot_products(R, t, rays_left, rays_right):
-    """The two normal equations, solved by hand."""
-    turned = rays_left @ R.T
-    across = np.sum(turned * rays_right, axis=-1)
-    along_left, along_right = turned @ t, rays_right @ t
-    # Both distances have the factor 1/(1 − across²), which is positive.
-    return (across * along_right - along_left > 0) & (along_right - across * along_left > 0)
-
-
-@IN_FRONT.right
 def pair_by_pair(R, t, rays_left, rays_right):
     answers = []
     for left, right in zip(rays_left, rays_right, strict=True):
@@ -678,70 +508,24 @@ def by_the_depths_of_opencv_s_triangulation(R, t, rays_left, rays_right):
     return (points[:, 2] > 0) & ((points @ R.T + t)[:, 2] > 0)
 
 
-@IN_FRONT.wrong(
-    "You looked at the left camera only. There are motions with points in front of the left camera that lie "
-    "behind the right one."
-)
+@IN_FRONT.wrong("You looked at the left camera only. A point may still lie behind the right one.")
 def left_only(R, t, rays_left, rays_right):
     return _distances(R, t, rays_left, rays_right)[:, 0] > 0
 
 
-@IN_FRONT.wrong(
-    "You looked at the right camera only. There are motions with points in front of the right camera that lie "
-    "behind the left one."
-)
-def right_only(R, t, rays_left, rays_right):
-    return _distances(R, t, rays_left, rays_right)[:, 1] > 0
-
-
-@IN_FRONT.wrong(
-    "You ask for more than some distance. In front of both is where both distances are above 0, in whatever unit: the "
-    "world may be a watch."
-)
-def farther_than_one(R, t, rays_left, rays_right):
-    return (_distances(R, t, rays_left, rays_right) > 1).all(axis=-1)
-
-
-@IN_FRONT.wrong("One camera is enough for yours. The point must be in front of *both*: `all`, where you have `any`.")
-def in_front_of_either(R, t, rays_left, rays_right):
-    return (_distances(R, t, rays_left, rays_right) > 0).any(axis=-1)
-
-
-@IN_FRONT.wrong("The two distances have one sign here; but both may be negative: then the point lies behind *both*.")
+@IN_FRONT.wrong("Both distances may be negative: then the point lies behind *both* cameras.")
 def of_one_sign(R, t, rays_left, rays_right):
     return np.prod(_distances(R, t, rays_left, rays_right), axis=-1) > 0
 
 
-@IN_FRONT.wrong("The sign of t is flipped: λ R r_left + t = μ r_right, so t goes to the other side as −t.")
+@IN_FRONT.wrong("The sign of t is wrong. In λ R r_left + t = μ r_right it moves across as −t.")
 def t_with_the_other_sign(R, t, rays_left, rays_right):
     return in_front(R, -t, rays_left, rays_right)
 
 
-@IN_FRONT.wrong("Your second column is +r_right. μ r_right comes to the left-hand side as −μ r_right.")
-def second_column_with_the_other_sign(R, t, rays_left, rays_right):
-    return in_front(R, t, rays_left, -rays_right)
-
-
-@IN_FRONT.wrong("R is missing: the left rays are still in the left camera's frame. Turn them by R first.")
+@IN_FRONT.wrong("R is missing: turn the left rays into the right camera's frame first.")
 def left_rays_not_turned(R, t, rays_left, rays_right):
     return in_front(np.eye(3), t, rays_left, rays_right)
-
-
-@IN_FRONT.wrong("Your left rays are turned by Rᵀ. For vectors in rows, R r is `rays @ R.T`.")
-def turned_backwards(R, t, rays_left, rays_right):
-    return in_front(R.T, t, rays_left, rays_right)
-
-
-@IN_FRONT.wrong("You answer for all pairs together. Each pair has an answer of its own: look along the last axis only.")
-def one_answer_for_all(R, t, rays_left, rays_right):
-    return (_distances(R, t, rays_left, rays_right) > 0).all()
-
-
-@IN_FRONT.wrong(
-    "You took a vote, and gave every pair the same answer. The vote comes later: here each pair is asked by itself."
-)
-def voted(R, t, rays_left, rays_right):
-    return np.full(len(rays_left), in_front(R, t, rays_left, rays_right).mean() > 0.5)
 
 
 @IN_FRONT.wrong("You looked at where the rays *point*, z > 0. The question is where they *meet*.")
@@ -814,31 +598,13 @@ def squared(F, uv_left, uv_right):
     return sampson(F, uv_left, uv_right) ** 2
 
 
-@SAMPSON.wrong("A distance is not negative: take the absolute value of xᵀFx.")
-def with_a_sign(F, uv_left, uv_right):
-    product, gradient = _product_and_gradient(F, uv_left, uv_right)
-    return product / np.linalg.norm(gradient, axis=1)
-
-
-@SAMPSON.wrong(
-    "You divide by the right line alone: that is the distance in the right picture, where only one pixel moves."
-)
+@SAMPSON.wrong("You divide by the right line alone. That is the distance when only the right pixel moves.")
 def right_line_alone(F, uv_left, uv_right):
     product, gradient = _product_and_gradient(F, uv_left, uv_right)
     return np.abs(product) / np.linalg.norm(gradient[:, :2], axis=1)
 
 
-@SAMPSON.wrong(
-    "You divide by the left line alone: that is the distance in the left picture, where only one pixel moves."
-)
-def left_line_alone(F, uv_left, uv_right):
-    product, gradient = _product_and_gradient(F, uv_left, uv_right)
-    return np.abs(product) / np.linalg.norm(gradient[:, 2:], axis=1)
-
-
-@SAMPSON.wrong(
-    "Only the first *two* numbers of each line belong below the root: the third is not a direction in the picture."
-)
+@SAMPSON.wrong("Only the first *two* numbers of each line belong below the root.")
 def all_three_numbers(F, uv_left, uv_right):
     left, right = _homogeneous(uv_left), _homogeneous(uv_right)
     product, _ = _product_and_gradient(F, uv_left, uv_right)
@@ -849,11 +615,6 @@ def all_three_numbers(F, uv_left, uv_right):
 def without_the_root(F, uv_left, uv_right):
     product, gradient = _product_and_gradient(F, uv_left, uv_right)
     return np.abs(product) / np.sum(gradient**2, axis=1)
-
-
-@SAMPSON.wrong("This is for Fᵀ, that is, for pictures that have changed places: x_right stands on the left of F.")
-def pictures_swapped(F, uv_left, uv_right):
-    return sampson(F.T, uv_left, uv_right)
 
 
 # 7: the model that is enough -----------------------------------------------------------------------------------------
@@ -919,37 +680,9 @@ def the_sum_cut_off(distances, dimension, parameters, sigma):
     return min(np.sum(distances**2 / sigma**2), 2 * (4 - dimension)) + _penalty(distances, dimension, parameters)
 
 
-@GRIC.wrong("The distances are not squared: d²/σ².")
-def not_squared(distances, dimension, parameters, sigma):
-    return np.minimum(distances / sigma, 2 * (4 - dimension)).sum() + _penalty(distances, dimension, parameters)
-
-
 @GRIC.wrong("d² is divided by σ. It is σ²: the quotient then has no unit.")
 def sigma_not_squared(distances, dimension, parameters, sigma):
     return np.minimum(distances**2 / sigma, 2 * (4 - dimension)).sum() + _penalty(distances, dimension, parameters)
-
-
-@GRIC.wrong("The noise is left out. A distance of a pixel is much where σ is a tenth of it, and little where σ is two.")
-def without_the_noise(distances, dimension, parameters, sigma):
-    return np.minimum(distances**2, 2 * (4 - dimension)).sum() + _penalty(distances, dimension, parameters)
-
-
-@GRIC.wrong("The larger one is taken where the smaller one is wanted: `np.minimum`.")
-def maximum_taken(distances, dimension, parameters, sigma):
-    limited = np.maximum(distances**2 / sigma**2, 2 * (4 - dimension))
-    return limited.sum() + _penalty(distances, dimension, parameters)
-
-
-@GRIC.wrong("The limit of a pair is twice as high: `2 * (4 - dimension)`.")
-def limit_halved(distances, dimension, parameters, sigma):
-    limited = np.minimum(distances**2 / sigma**2, 4 - dimension)
-    return limited.sum() + _penalty(distances, dimension, parameters)
-
-
-@GRIC.wrong("The limit goes by what the model fixes, `4 - dimension`. You took what it leaves free.")
-def limit_by_what_is_free(distances, dimension, parameters, sigma):
-    limited = np.minimum(distances**2 / sigma**2, 2 * dimension)
-    return limited.sum() + _penalty(distances, dimension, parameters)
 
 
 @GRIC.wrong("The price of the dimension is paid for each pair: once more n.")
@@ -958,37 +691,10 @@ def dimension_paid_once(distances, dimension, parameters, sigma):
     return gric(distances, dimension, parameters, sigma) - dimension * (n - 1) * np.log(4)
 
 
-@GRIC.wrong("The price of the parameters is missing: `parameters * np.log(4 * n)`.")
-def parameters_for_nothing(distances, dimension, parameters, sigma):
-    return gric(distances, dimension, parameters, sigma) - parameters * np.log(4 * len(distances))
-
-
-@GRIC.wrong("The price of the dimension is missing: `dimension * n * np.log(4)`.")
-def dimension_for_nothing(distances, dimension, parameters, sigma):
-    return gric(distances, dimension, parameters, sigma) - dimension * len(distances) * np.log(4)
-
-
-@GRIC.wrong("This is the price of the freedom alone. What the pairs miss the model by comes first.")
-def price_alone(distances, dimension, parameters, sigma):
-    return _penalty(distances, dimension, parameters)
-
-
 @GRIC.wrong("These are decimal logarithms. `np.log` is the natural one.")
 def to_the_base_of_ten(distances, dimension, parameters, sigma):
     residuals = np.minimum(distances**2 / sigma**2, 2 * (4 - dimension)).sum()
     return residuals + _penalty(distances, dimension, parameters) / np.log(10)
-
-
-@GRIC.wrong("This is a mean over the pairs. A sum is wanted: its balance with the prices depends on n.")
-def the_mean_of_the_pairs(distances, dimension, parameters, sigma):
-    residuals = np.minimum(distances**2 / sigma**2, 2 * (4 - dimension)).mean()
-    return residuals + _penalty(distances, dimension, parameters)
-
-
-@GRIC.wrong("D and k have changed places: D is paid n times, k once.")
-def dimension_and_parameters_swapped(distances, dimension, parameters, sigma):
-    residuals = np.minimum(distances**2 / sigma**2, 2 * (4 - dimension)).sum()
-    return residuals + _penalty(distances, parameters, dimension)
 
 
 EXERCISES = (FUNDAMENTAL, LINE, EPIPOLE, EIGHT_POINT, SAMPSON, GRIC, IN_FRONT)

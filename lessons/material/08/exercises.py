@@ -70,106 +70,29 @@ def point_by_point(d, f, B, doffs):
     return np.reshape([one(shift) for shift in np.ravel(d + doffs)], np.shape(d))
 
 
-@DEPTH.right
-def through_the_right_camera_s_shifted_column(d, f, B, doffs):
-    """x_left − x_right = (u_left − cx_left − u_right + cx_right) / f is B / Z."""
-    parallax = (d + doffs) / f
-    with np.errstate(divide="ignore"):
-        return np.where(parallax >= 0, B / np.abs(parallax), np.nan)
-
-
-@DEPTH.wrong(
-    "doffs is left out. Then a point at infinity would need d = 0, but here the principal points differ and it has "
-    "d = −doffs."
-)
+@DEPTH.wrong("doffs is left out. A point at infinity has d = −doffs here, not 0.")
 def doffs_left_out(d, f, B, doffs):
     return depth(d, f, B, 0.0)
 
 
-@DEPTH.wrong(
-    "This is f B / d, which holds where the two principal points agree. Here they do not: doffs belongs in it. After "
-    "that, ask what a sum of 0 and a sum below 0 mean."
-)
+@DEPTH.wrong("f B / d holds only where the principal points agree. Add doffs, then look at sums of 0 and below.")
 def the_formula_of_every_book(d, f, B, doffs):
     return _divided(d, f, B, 0.0)
 
 
-@DEPTH.wrong(
-    "You subtract doffs. It is cx_right − cx_left, so a point at infinity has d = −doffs: only the *sum* d + doffs "
-    "becomes 0 there."
-)
+@DEPTH.wrong("You subtract doffs. A point at infinity has d = −doffs: the *sum* d + doffs is 0.")
 def doffs_subtracted(d, f, B, doffs):
     return depth(d, f, B, -doffs)
 
 
-@DEPTH.wrong(
-    "doffs has the wrong sign: put in d = −doffs, a point at infinity, and your denominator is not 0. And a "
-    "denominator below 0 makes a depth below 0, where NaN is wanted."
-)
-def doffs_subtracted_and_nothing_checked(d, f, B, doffs):
-    return _divided(d, f, B, -doffs)
-
-
-@DEPTH.wrong("The formula is right. A sum below 0 gives a *negative* depth, though: NaN is the honest answer there.")
+@DEPTH.wrong("The formula is right. Where the sum is below 0 the answer is NaN, not a *negative* depth.")
 def negative_depths(d, f, B, doffs):
     return _divided(d, f, B, doffs)
 
 
-@DEPTH.wrong(
-    "The absolute value hides what is behind the cameras: such a sum is below 0, and you make an ordinary depth of it. "
-    "The answer there is NaN."
-)
-def mirrored_in_front(d, f, B, doffs):
-    return np.abs(_divided(d, f, B, doffs))
-
-
-@DEPTH.wrong("Where d + doffs is exactly 0 there is an answer: the rays are parallel, the point is infinitely far.")
+@DEPTH.wrong("Where d + doffs is exactly 0 the point is infinitely far: the answer is inf.")
 def nan_at_infinity(d, f, B, doffs):
     return np.where(d + doffs <= 0, np.nan, _divided(d, f, B, doffs))
-
-
-@DEPTH.wrong("You asked whether d is negative. What must not be negative is d + doffs.")
-def sign_of_d_asked(d, f, B, doffs):
-    return np.where(d < 0, np.nan, np.abs(_divided(d, f, B, doffs)))
-
-
-@DEPTH.wrong("This is upside down: a *larger* disparity is a *nearer* point.")
-def upside_down(d, f, B, doffs):
-    return (d + doffs) * B / f
-
-
-@DEPTH.wrong(
-    "You add doffs to the depth. It is a number of pixels and belongs to d: put brackets around d + doffs, then divide."
-)
-def brackets_forgotten(d, f, B, doffs):
-    return f * B / d + doffs
-
-
-@DEPTH.wrong(
-    "Where no point has such a disparity you answer 0, which is the camera's own place. A missing answer is NaN."
-)
-def zero_for_no_point(d, f, B, doffs):
-    return np.nan_to_num(depth(d, f, B, doffs), nan=0.0, posinf=np.inf)
-
-
-@DEPTH.wrong(
-    "A small number in place of 0 makes infinity a very large depth, and a sum below 0 too. Ask for both cases instead."
-)
-def epsilon_for_zero(d, f, B, doffs):
-    return f * B / np.maximum(d + doffs, 1e-6)
-
-
-@DEPTH.wrong("B is missing: this is how many baselines away the point is. Times B it is in metres.")
-def in_baselines(d, f, B, doffs):
-    return depth(d, f, 1.0, doffs)
-
-
-@DEPTH.wrong(
-    "You divide by 16. OpenCV's matchers count in sixteenths of a pixel, but the disparities of this exercise are in "
-    "pixels."
-)
-def sixteenths_that_are_none(d, f, B, doffs):
-    return depth(d, f / 16, B, doffs)
 
 
 # 2: which baseline? --------------------------------------------------------------------------------------------------
@@ -210,12 +133,6 @@ def by_relative_errors(Z, error, f, disparity_error):
 
 
 @BASELINE.right
-def by_the_slope_of_z_over_d(Z, error, f, disparity_error):
-    fB_over_d_squared = error / disparity_error
-    return Z / f * (Z / fB_over_d_squared)
-
-
-@BASELINE.right
 def one_by_one(Z, error, f, disparity_error):
     pairs = zip(np.ravel(Z), np.ravel(error), strict=True)
     return np.reshape([z * z / e * disparity_error / f for z, e in pairs], np.shape(Z))
@@ -226,72 +143,19 @@ def depth_not_squared(Z, error, f, disparity_error):
     return Z * disparity_error / (f * error)
 
 
-@BASELINE.wrong("The focal length is missing: f and B do the same work here.")
-def without_the_focal_length(Z, error, f, disparity_error):
-    return Z**2 * disparity_error / error
-
-
-@BASELINE.wrong("This is 1/B: turn it over.")
-def upside_down_baseline(Z, error, f, disparity_error):
-    return f * error / (Z**2 * disparity_error)
-
-
-@BASELINE.wrong("The error of the disparity is left out, as if it were always one pixel.")
-def one_pixel_taken_for_granted(Z, error, f, disparity_error):
-    return Z**2 / (f * error)
-
-
-@BASELINE.wrong(
-    "Both errors stand in the numerator, so that you would need a *longer* baseline when more error is allowed. ΔZ "
-    "belongs below."
-)
-def both_errors_above(Z, error, f, disparity_error):
-    return Z**2 * disparity_error * error / f
-
-
-@BASELINE.wrong(
-    "The two errors have changed places: a worse matcher needs a longer baseline, a larger allowance a shorter one."
-)
+@BASELINE.wrong("The two errors have changed places: a worse matcher needs a longer baseline.")
 def errors_swapped(Z, error, f, disparity_error):
     return Z**2 * error / (f * disparity_error)
 
 
-@BASELINE.wrong(
-    "You count the error on both sides of Z. ± ΔZ goes with ± Δd: one side of each is what the equation compares."
-)
-def both_sides_counted(Z, error, f, disparity_error):
-    return 2 * Z**2 * disparity_error / (f * error)
-
-
-@BASELINE.wrong(
-    "You solved for the exact *far* end of the interval, Z + ΔZ = f B / (d − Δd). Asked is the first order, the slope "
-    "of Z at d."
-)
+@BASELINE.wrong("You solved for the exact *far* end of the interval. The first order is asked, the slope of Z at d.")
 def exact_far_end(Z, error, f, disparity_error):
     return Z * disparity_error * (Z / error + 1) / f
 
 
-@BASELINE.wrong(
-    "You solved for the exact *near* end of the interval, Z − ΔZ = f B / (d + Δd). Asked is the first order, the slope "
-    "of Z at d."
-)
-def exact_near_end(Z, error, f, disparity_error):
-    return Z * disparity_error * (Z / error - 1) / f
-
-
-@BASELINE.wrong(
-    "This is Z = f B / d solved for B with the *error* of the disparity in place of the disparity. The error in depth "
-    "does not occur in it."
-)
+@BASELINE.wrong("You put the *error* of the disparity into Z = f B / d. Use ΔZ ≈ Z² Δd / (f B).")
 def disparity_confused_with_its_error(Z, error, f, disparity_error):
     return Z * disparity_error / f
-
-
-@BASELINE.wrong(
-    "f stands in the numerator. A longer focal length makes depths *more* exact, as a longer baseline does."
-)
-def focal_length_above(Z, error, f, disparity_error):
-    return Z**2 * disparity_error * f / error
 
 
 # 3: a pixel, rectified -----------------------------------------------------------------------------------------------
@@ -359,14 +223,6 @@ def as_opencv_s_perspective_transform(uv, K, R, K_new):
 
 
 @RECTIFIED.right
-def step_by_step(uv, K, R, K_new):
-    x, y = (uv[..., 0] - K[0, 2]) / K[0, 0], (uv[..., 1] - K[1, 2]) / K[1, 1]
-    X, Y, Z = np.moveaxis(np.stack([x, y, np.ones_like(x)], axis=-1) @ R.T, -1, 0)
-    u, v = K_new[0, 0] * X / Z + K_new[0, 2], K_new[1, 1] * Y / Z + K_new[1, 2]
-    return np.where((Z > 0)[..., None], np.stack([u, v], axis=-1), np.nan)
-
-
-@RECTIFIED.right
 def one_pixel_at_a_time(uv, K, R, K_new):
     def one(pixel):
         x, y, w = K_new @ R @ np.linalg.solve(K, np.append(pixel, 1))
@@ -375,17 +231,12 @@ def one_pixel_at_a_time(uv, K, R, K_new):
     return np.reshape([one(pixel) for pixel in uv.reshape(-1, 2)], uv.shape)
 
 
-@RECTIFIED.wrong(
-    "Right for all pixels that stay in view. A ray that is turned behind the camera has no pixel: NaN where the third "
-    "number is not positive."
-)
+@RECTIFIED.wrong("A ray turned behind the camera has no pixel: NaN where the third number is not positive.")
 def behind_kept(uv, K, R, K_new):
     return _turned(uv, K_new @ R @ np.linalg.inv(K))
 
 
-@RECTIFIED.wrong(
-    "R is transposed: it takes rays of the camera as it was to the turned one. (For rows, R r is `r @ R.T`.)"
-)
+@RECTIFIED.wrong("R is transposed: it takes old rays to new ones. For rows, R r is `r @ R.T`.")
 def turned_back(uv, K, R, K_new):
     return rectified(uv, K, R.T, K_new)
 
@@ -395,65 +246,14 @@ def old_matrix_at_both_ends(uv, K, R, K_new):
     return rectified(uv, K, R, K)
 
 
-@RECTIFIED.wrong("K and K_new have changed places: pixels come in with K.")
-def matrices_swapped(uv, K, R, K_new):
-    return rectified(uv, K_new, R, K)
-
-
-@RECTIFIED.wrong("Pixels are no rays: K⁻¹ comes first.")
-def pixels_taken_for_rays(uv, K, R, K_new):
-    return _turned(uv, K_new @ R)
-
-
-@RECTIFIED.wrong("These are rays of the turned camera, x/z and y/z. K_new makes pixels of them.")
-def rays_left_as_they_are(uv, K, R, K_new):
-    return rectified(uv, K, R, np.eye(3))
-
-
-@RECTIFIED.wrong(
-    "You did not divide by the third number. After a turn it is no longer 1, and a pixel is (first, second) / third."
-)
+@RECTIFIED.wrong("You did not divide by the third number. After a turn it is no longer 1.")
 def not_divided(uv, K, R, K_new):
     return (_homogeneous(uv) @ (K_new @ R @ np.linalg.inv(K)).T)[..., :2]
 
 
-@RECTIFIED.wrong(
-    "K is not inverted. K takes rays to pixels; here the pixel is given and its ray is wanted, so it is K⁻¹."
-)
-def not_inverted(uv, K, R, K_new):
-    return _turned(uv, K_new @ R @ K)
-
-
-@RECTIFIED.wrong("The chain stands in reverse order: the matrix that acts first stands on the *right*, K_new R K⁻¹ x.")
-def chain_reversed(uv, K, R, K_new):
-    return _turned(uv, np.linalg.inv(K) @ R @ K_new)
-
-
-@RECTIFIED.wrong(
-    "The product is right, but pixels stand in rows: with H = K_new R K⁻¹ it is `x @ H.T`, and you wrote `x @ H`."
-)
+@RECTIFIED.wrong("The product is right, but pixels stand in rows: with H = K_new R K⁻¹ write `x @ H.T`.")
 def product_not_transposed(uv, K, R, K_new):
     return _turned(uv, (K_new @ R @ np.linalg.inv(K)).T)
-
-
-@RECTIFIED.wrong("A ray that the turned camera does not see is answered by the pixel (0, 0). Nothing is there: NaN.")
-def corner_for_no_pixel(uv, K, R, K_new):
-    return np.nan_to_num(rectified(uv, K, R, K_new))
-
-
-@RECTIFIED.wrong("The rays are not turned: R is missing between K_new and K⁻¹.")
-def rotation_left_out(uv, K, R, K_new):
-    return _turned(uv, K_new @ np.linalg.inv(K))
-
-
-@RECTIFIED.wrong("These are the pixels that came in: nothing has happened to them yet.")
-def left_where_they_were(uv, K, R, K_new):
-    return uv
-
-
-@RECTIFIED.wrong("You read (row, column). A pixel is (u, v): the column first, then the row.")
-def rows_first(uv, K, R, K_new):
-    return rectified(uv[..., ::-1], K, R, K_new)
 
 
 # 4: find the bugs ----------------------------------------------------------------------------------------------------
@@ -529,37 +329,22 @@ def in_sixteenths_throughout(found, K, P_left, P_right):
     return Z
 
 
-@METRIC_DEPTH.right
-def by_exercise_1(found, K, P_left, P_right):
-    d = np.where(found < 0, np.nan, found / 16)
-    return depth(d, P_left[0, 0], -P_right[0, 3] / P_right[0, 0], P_right[0, 2] - P_left[0, 2])
-
-
-@METRIC_DEPTH.wrong(
-    "The sixteenths are pixels now. What is left comes from one thought: that the rectified cameras are the cameras "
-    "that were calibrated."
-)
+@METRIC_DEPTH.wrong("The sixteenths are right now. The rectified cameras are not those that were calibrated.")
 def only_the_sixteenths_mended(found, K, P_left, P_right):
     return _metric(found, K[0, 0], 0, P_right, 16)
 
 
-@METRIC_DEPTH.wrong(
-    "The focal length is that of the rectified camera now. Look at the unit of `found` next, and then at what a point "
-    "at infinity has for a disparity."
-)
+@METRIC_DEPTH.wrong("The focal length is right now. Look at the unit of `found` next, and at a point at infinity.")
 def only_the_focal_length_mended(found, K, P_left, P_right):
     return _metric(found, P_left[0, 0], 0, P_right, 1)
 
 
-@METRIC_DEPTH.wrong(
-    "The principal points are taken care of. But you add pixels to a number that is not in pixels, and f still comes "
-    "from a camera that did not take this picture."
-)
+@METRIC_DEPTH.wrong("The principal points are right now. Look at the unit of `found` next, and at where f comes from.")
 def only_doffs_mended(found, K, P_left, P_right):
     return _metric(found, K[0, 0], P_right[0, 2] - P_left[0, 2], P_right, 1)
 
 
-@METRIC_DEPTH.wrong("One left: a point at infinity has disparity −doffs here, because the two principal points differ.")
+@METRIC_DEPTH.wrong("One left: the principal points differ, so a point at infinity has disparity −doffs.")
 def doffs_still_missing(found, K, P_left, P_right):
     return _metric(found, P_left[0, 0], 0, P_right, 16)
 
@@ -574,70 +359,9 @@ def sixteenths_still_taken_for_pixels(found, K, P_left, P_right):
     return _metric(found, P_left[0, 0], P_right[0, 2] - P_left[0, 2], P_right, 1)
 
 
-@METRIC_DEPTH.wrong("doffs has the wrong sign: cx_right − cx_left is *added* to d.")
-def doffs_with_the_wrong_sign(found, K, P_left, P_right):
-    return _metric(found, P_left[0, 0], P_left[0, 2] - P_right[0, 2], P_right, 16)
-
-
-@METRIC_DEPTH.wrong(
-    "You compare the rectified right camera with the *original* left one: doffs is the difference of the two rectified "
-    "principal points, from P_right and P_left."
-)
-def doffs_from_the_old_camera(found, K, P_left, P_right):
-    return _metric(found, P_left[0, 0], P_right[0, 2] - K[0, 2], P_right, 16)
-
-
-@METRIC_DEPTH.wrong(
-    "You divide the sum by 16, and doffs with it. doffs is in pixels already: only `found` is in sixteenths."
-)
+@METRIC_DEPTH.wrong("You divide the sum by 16, and doffs with it. doffs is in pixels already.")
 def doffs_divided_too(found, K, P_left, P_right):
     return _metric(found, P_left[0, 0], (P_right[0, 2] - P_left[0, 2]) / 16, P_right, 16)
-
-
-@METRIC_DEPTH.wrong("Whole pixels: `//` cuts off the sixteenths that the matcher worked for. Divide with `/`.")
-def sixteenths_cut_off(found, K, P_left, P_right):
-    return _metric(found // 16, P_left[0, 0], P_right[0, 2] - P_left[0, 2], P_right, 1)
-
-
-@METRIC_DEPTH.wrong("The sixteenths go the wrong way: a number of sixteenths is *divided* by 16 to give pixels.")
-def multiplied_by_sixteen(found, K, P_left, P_right):
-    return _metric(found, P_left[0, 0], P_right[0, 2] - P_left[0, 2], P_right, 1 / 16)
-
-
-@METRIC_DEPTH.wrong(
-    "What stands in `P_right[0, 3]` is −f B, in pixels times metres. You took it for the baseline and multiplied by f "
-    "once more."
-)
-def focal_length_counted_twice(found, K, P_left, P_right):
-    return P_left[0, 0] * metric_depth(found, K, P_left, P_right)
-
-
-@METRIC_DEPTH.wrong(
-    "Where nothing was found `found` is negative, and you make a depth of that too. It has to stay NaN."
-)
-def no_match_kept(found, K, P_left, P_right):
-    return -P_right[0, 3] / (found / 16 + P_right[0, 2] - P_left[0, 2])
-
-
-@METRIC_DEPTH.wrong(
-    "All your depths are 0. Is the baseline taken from P_left? It stands in the *right* camera's P: the left one "
-    "stands at the origin, and its entry is 0."
-)
-def baseline_of_the_left_camera(found, K, P_left, P_right):
-    return np.where(found < 0, np.nan, 0.0)
-
-
-@METRIC_DEPTH.wrong("The baseline has gone. f / d alone is a depth in baselines, not in metres.")
-def baseline_left_out(found, K, P_left, P_right):
-    return _metric(found, P_left[0, 0], P_right[0, 2] - P_left[0, 2], P_right, 16) * P_right[0, 0] / -P_right[0, 3]
-
-
-@METRIC_DEPTH.wrong(
-    "Where `found` is 0 you answer NaN. Nothing was found where it is *negative*; 0 is a disparity like others, and "
-    "with doffs not even at infinity."
-)
-def nothing_where_found_is_zero(found, K, P_left, P_right):
-    return np.where(found > 0, metric_depth(found, K, P_left, P_right), np.nan)
 
 
 # 5: the left–right check ---------------------------------------------------------------------------------------------
@@ -740,13 +464,6 @@ def column_by_column(d_left, d_right, tolerance):
 
 
 @LEFT_RIGHT.right
-def with_the_disparity_rounded(d_left, d_right, tolerance):
-    partner = np.arange(len(d_left)) - np.rint(d_left)
-    back, inside = _led_back(d_left, d_right, partner)
-    return _agreeing(d_left, back, inside, tolerance)
-
-
-@LEFT_RIGHT.right
 def by_looking_up_the_nearest_column(d_left, d_right, tolerance):
     from scipy.interpolate import interp1d
 
@@ -756,10 +473,7 @@ def by_looking_up_the_nearest_column(d_left, d_right, tolerance):
     return np.where(np.abs(there(partner) - d_left) <= tolerance, d_left, np.nan)
 
 
-@LEFT_RIGHT.wrong(
-    "You compare the two disparities at the *same* column. What the left picture shows at u, the right one shows at "
-    "u − d."
-)
+@LEFT_RIGHT.wrong("You compare at the *same* column. The right picture shows the thing at u − d.")
 def same_column(d_left, d_right, tolerance):
     return np.where(np.abs(d_right - d_left) <= tolerance, d_left, np.nan)
 
@@ -770,40 +484,19 @@ def other_way(d_left, d_right, tolerance):
     return _agreeing(d_left, back, inside, tolerance)
 
 
-@LEFT_RIGHT.wrong(
-    "An index below 0 counts from the end of the row in NumPy: such a partner is outside, and the answer NaN."
-)
+@LEFT_RIGHT.wrong("An index below 0 counts from the end in NumPy. Such a partner is outside: NaN.")
 def counted_from_the_end(d_left, d_right, tolerance):
     partner = np.rint(np.nan_to_num(np.arange(len(d_left)) - d_left)).astype(int) % len(d_left)
     return _agreeing(d_left, d_right[partner], True, tolerance)
 
 
-@LEFT_RIGHT.wrong(
-    "Partners outside are moved to the first or last column. What that column shows is another thing: outside means "
-    "NaN."
-)
-def clamped_to_the_border(d_left, d_right, tolerance):
-    partner = np.rint(np.nan_to_num(np.arange(len(d_left)) - d_left)).astype(int)
-    return _agreeing(d_left, d_right[np.clip(partner, 0, len(d_left) - 1)], True, tolerance)
-
-
-@LEFT_RIGHT.wrong("You keep what fails and drop what passes.")
-def failures_kept(d_left, d_right, tolerance):
-    return np.where(np.isnan(left_right(d_left, d_right, tolerance)), d_left, np.nan)
-
-
-@LEFT_RIGHT.wrong(
-    "You cut off the fraction of u − d, which looks one column too far left half of the time. The nearest column is "
-    "`np.rint`."
-)
+@LEFT_RIGHT.wrong("You cut off the fraction of u − d. `np.rint` gives the nearest column.")
 def fraction_cut_off(d_left, d_right, tolerance):
     back, inside = _led_back(d_left, d_right, np.floor(np.arange(len(d_left)) - d_left))
     return _agreeing(d_left, back, inside, tolerance)
 
 
-@LEFT_RIGHT.wrong(
-    "The difference may be negative, and then it is always below the tolerance. Its *absolute value* is to be compared."
-)
+@LEFT_RIGHT.wrong("A negative difference is always below the tolerance. Compare its *absolute value*.")
 def one_sided(d_left, d_right, tolerance):
     back, inside = _led_back(d_left, d_right, np.rint(np.arange(len(d_left)) - d_left))
     return np.where(inside & (back - d_left <= tolerance), d_left, np.nan)
@@ -813,45 +506,6 @@ def one_sided(d_left, d_right, tolerance):
 def less_than_the_tolerance(d_left, d_right, tolerance):
     back, inside = _led_back(d_left, d_right, np.rint(np.arange(len(d_left)) - d_left))
     return np.where(inside & (np.abs(back - d_left) < tolerance), d_left, np.nan)
-
-
-@LEFT_RIGHT.wrong("Your threshold is one pixel whatever is asked for: compare with `tolerance`.")
-def one_pixel_whatever_is_asked(d_left, d_right, tolerance):
-    return left_right(d_left, d_right, 1.0)
-
-
-@LEFT_RIGHT.wrong("What is kept is the *right* picture's disparity. The left row is checked: keep d_left as it is.")
-def the_right_row_s_answer(d_left, d_right, tolerance):
-    back, _ = _led_back(d_left, d_right, np.rint(np.arange(len(d_left)) - d_left))
-    return np.where(np.isnan(left_right(d_left, d_right, tolerance)), np.nan, back)
-
-
-@LEFT_RIGHT.wrong(
-    "Where the check fails you answer 0. A disparity of 0 is a point at infinity, not a missing one: NaN."
-)
-def zero_for_a_failure(d_left, d_right, tolerance):
-    return np.nan_to_num(left_right(d_left, d_right, tolerance))
-
-
-@LEFT_RIGHT.wrong(
-    "Nothing passes your check. Did you add the two disparities, as if the right picture's were negative? Both are "
-    "u_left − u_right, and agree where their *difference* is small."
-)
-def disparities_added(d_left, d_right, tolerance):
-    back, inside = _led_back(d_left, d_right, np.rint(np.arange(len(d_left)) - d_left))
-    return np.where(inside & (np.abs(back + d_left) <= tolerance), d_left, np.nan)
-
-
-@LEFT_RIGHT.wrong("These are yes and no. Wanted are the disparities themselves, with NaN for every no.")
-def yes_and_no(d_left, d_right, tolerance):
-    return np.isfinite(left_right(d_left, d_right, tolerance))
-
-
-@LEFT_RIGHT.wrong(
-    "Nothing is dropped: the left row comes out as it went in. Where the right row disagrees, NaN is wanted."
-)
-def nothing_dropped(d_left, d_right, tolerance):
-    return d_left
 
 
 # 6: between two pixels -----------------------------------------------------------------------------------------------
@@ -909,14 +563,6 @@ def _over(above, below):
 
 
 @BETWEEN.right
-def by_a_and_b(c_before, c_best, c_after):
-    a, b = (c_before + c_after) / 2 - c_best, (c_after - c_before) / 2
-    with np.errstate(divide="ignore", invalid="ignore"):
-        delta = -b / (2 * a)
-    return np.where((c_best <= np.minimum(c_before, c_after)) & (a != 0), delta, np.nan)
-
-
-@BETWEEN.right
 def by_polyfit(c_before, c_best, c_after):
     def one(before, best, after):
         if best > min(before, after) or before == best == after:
@@ -935,70 +581,26 @@ def where_two_slopes_meet_zero(c_before, c_best, c_after):
     return np.where((left <= 0) & (right >= 0), -0.5 - _over(left, right - left), np.nan)
 
 
-@BETWEEN.wrong("You go away from the smaller neighbour. Where c_after is the smaller one, δ is above 0.")
-def away_from_the_smaller(c_before, c_best, c_after):
-    return -between_pixels(c_before, c_best, c_after)
-
-
-@BETWEEN.wrong(
-    "This is twice too far: the slope of `a * x**2 + b * x` is `2 * a * x + b`. A minimum halfway gives ±½, not ±1."
-)
-def twice_too_far(c_before, c_best, c_after):
-    return 2 * between_pixels(c_before, c_best, c_after)
-
-
-@BETWEEN.wrong("This is half of it: `c_before - 2 * c_best + c_after` is `2 * a` already.")
-def half_of_it(c_before, c_best, c_after):
-    return between_pixels(c_before, c_best, c_after) / 2
-
-
-@BETWEEN.wrong("The middle cost counts twice in `c_before - 2 * c_best + c_after`, and you took it once.")
+@BETWEEN.wrong("The middle cost counts twice in `c_before - 2 * c_best + c_after`.")
 def middle_counted_once(c_before, c_best, c_after):
     delta = _over(c_before - c_after, 2 * (c_before - c_best + c_after))
     return _dressed(delta, c_before, c_best, c_after)
 
 
-@BETWEEN.wrong("You added the middle cost where it is subtracted: `c_before - 2 * c_best + c_after`.")
-def middle_added(c_before, c_best, c_after):
-    delta = _over(c_before - c_after, 2 * (c_before + 2 * c_best + c_after))
-    return _dressed(delta, c_before, c_best, c_after)
-
-
-@BETWEEN.wrong("The middle cost is left out. Raise all three by as much, and δ must stay as it is.")
-def middle_left_out(c_before, c_best, c_after):
-    return _dressed(_over(c_before - c_after, 2 * (c_before + c_after)), c_before, c_best, c_after)
-
-
-@BETWEEN.wrong("Where c_best is not the least of the three, the parabola's minimum is not near it: NaN is wanted.")
+@BETWEEN.wrong("Where c_best is not the least, the parabola's minimum is not near it: NaN is wanted.")
 def followed_too_far(c_before, c_best, c_after):
     return _over(c_before - c_after, 2 * (c_before - 2 * c_best + c_after))
 
 
-@BETWEEN.wrong("Only one neighbour is compared with c_best. Neither may be below it.")
-def one_neighbour_asked(c_before, c_best, c_after):
-    delta = followed_too_far(c_before, c_best, c_after)
-    return np.where((c_best <= c_before) & np.isfinite(delta), delta, np.nan)
-
-
-@BETWEEN.wrong("Where a neighbour's cost is as low as the best one, the minimum is halfway, ±½, and not unknown.")
+@BETWEEN.wrong("Where a neighbour's cost is as low as the best, the minimum is halfway: ±½, not NaN.")
 def ties_dropped(c_before, c_best, c_after):
     return np.where((c_best < c_before) & (c_best < c_after), between_pixels(c_before, c_best, c_after), np.nan)
 
 
-@BETWEEN.wrong("A 0 says that the minimum is right at this pixel. Where nobody knows, NaN is the answer.")
-def zero_for_unknown(c_before, c_best, c_after):
-    return np.nan_to_num(between_pixels(c_before, c_best, c_after))
-
-
-@BETWEEN.wrong("These are two straight lines of one slope, a V. Asked for is the parabola through the three costs.")
+@BETWEEN.wrong("These are two straight lines, a V. The parabola through the three costs is asked for.")
 def two_straight_lines(c_before, c_best, c_after):
     steep = 2 * (np.maximum(c_before, c_after) - c_best)
     return _dressed(_over(c_before - c_after, steep), c_before, c_best, c_after)
-
-
-@BETWEEN.wrong("This is the least cost of the parabola, and wanted is the place δ where it is least.")
-def the_cost_there(c_before, c_best, c_after):
-    return c_best - (c_before - c_after) * between_pixels(c_before, c_best, c_after) / 4
 
 
 @BETWEEN.wrong("You clip δ to −½ … ½. An answer beyond it says that c_best is not the least: NaN.")
