@@ -379,6 +379,11 @@ def guard_removed(points, f, cx, cy):
     return project(points, f, cx, cy)
 
 
+@IN_FRONT.wrong("With |Z| what stands behind you is painted over what you see. It has no image at all: NaN.")
+def sign_of_the_depth_dropped(points, f, cx, cy):
+    return project(np.concatenate([points[..., :2], np.abs(points[..., 2:])], axis=-1), f, cx, cy)
+
+
 @IN_FRONT.wrong("A tiny depth puts points behind the camera far outside the picture. They have no image: NaN.")
 def depth_clamped(points, f, cx, cy):
     return f * points[..., :2] / np.maximum(points[..., 2:], 1e-8) + (cx, cy)

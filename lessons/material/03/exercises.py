@@ -100,6 +100,11 @@ def transpose_forgotten(uv, K):
     return ray(uv, K.T)
 
 
+@RAY.wrong("You never take the principal point away. Rays count from the optical axis, and not from the first pixel.")
+def principal_point_forgotten(uv, K):
+    return ray(uv + K[:2, 2], K)
+
+
 @RAY.wrong("Skew multiplies y, the *direction*. You took skew · v away, with v still in pixels.")
 def skew_times_the_row_in_pixels(uv, K):
     x = (uv[..., 0] - K[0, 2] - K[0, 1] * uv[..., 1]) / K[0, 0]
