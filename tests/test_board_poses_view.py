@@ -10,7 +10,7 @@ from every_view import written
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.draw.marks import Dots
+from camviz.draw.marks import Discs
 from camviz.lenses import BrownConrady
 from camviz_clinic.files import load
 from camviz_clinic.views.board_poses import BoardPosesView
@@ -81,7 +81,7 @@ def test_the_readers_centres_are_drawn_and_their_largest_error():
     for function, error in ((lambda R, t: -R.T @ t, 0.0), (lambda R, t: t, away)):
         picture = view.but(yours=function).figure(draft=True)
         assert f"wrong by up to {error:.2f} m" in written(picture)
-        dots = [mark for mark in picture.marks.of("orange") if isinstance(mark, Dots) and mark.diameter > 10]
+        dots = [mark for mark in picture.marks.of("orange") if isinstance(mark, Discs) and mark.diameter > 10]
         assert sum(len(mark.points) for mark in dots) == 3
         assert "wrong by" not in written(view.but(yours=function, still="camera").figure(draft=True))
     assert view.but(yours=lambda R, t: None).figure(draft=True).marks.of("awaited")

@@ -6,7 +6,7 @@ import pytest
 from every_view import written
 
 from camviz.cameras import Camera, Intrinsics
-from camviz.draw.marks import Dots
+from camviz.draw.marks import Discs
 from camviz.lenses import BrownConrady
 from camviz.scenes import board_corners
 from camviz.views.frustum import SUBJECT, FrustumView
@@ -123,7 +123,7 @@ def test_the_readers_camera_stands_where_their_function_says():
     view = FrustumView(mode="edit t", x=0.2, y=0.0, z=1.0, yaw_deg=30.0, pitch_deg=0.0, yours=lambda R, t: -R.T @ t)
     np.testing.assert_allclose(view._your_camera.centre, view.camera.centre, atol=1e-12)
     panel = FrustumView(yours=lambda R, t: -R.T @ t).figure(draft=True).marks.panels()["picture"].marks
-    (dots,) = [mark for mark in panel.of("orange") if isinstance(mark, Dots)]
+    (dots,) = [mark for mark in panel.of("orange") if isinstance(mark, Discs)]
     np.testing.assert_allclose(dots.points, panel.points("red"), atol=1e-9)
     wrong = view.but(yours=lambda R, t: -t)
     np.testing.assert_allclose(wrong._your_camera.centre, (-0.2, 0, -1))

@@ -226,7 +226,7 @@ def later(start, by):
 
 def three_panels(lesson):
     view = cell_of(lesson, "fold = explore(")
-    view.outputs[-1].data["text/html"] = "<img alt='' src=''>" * 3
+    view.outputs[-1].data["text/html"] = "<img alt='' src='data:'>" * 3
 
 
 @pytest.mark.parametrize(

@@ -10,10 +10,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
+from camviz.draw import styles
 from camviz.draw.marks import Group, Inset, Mark, Marks, Text
 
 SMALLEST = 12  # CSS pixels, of any word at any size of the picture
-SIZES = {"title": 14.0, "note": 12.0, "tick": 12.0, "number": 12.5, "": 13.0}  # picture units, as in style.css
+SIZES = {**styles.SIZES, "": styles.SIZE}  # picture units
 FIXED = -1  # the rank of words that stay beside what they name
 ASCENT, DESCENT = 0.93, 0.24  # of the size
 LEADING = 1.36  # from line to line of a paragraph, of the size
