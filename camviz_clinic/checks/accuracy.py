@@ -98,13 +98,15 @@ class CameraAccuracy:
 
     def sentence(self, subject: str = "") -> str:
         """What the camera is good for; `subject` names it where there are several."""
-        begin = f"{subject}: g" if subject else "G"
+        sentence = self._sentence()
+        return f"{subject}: {sentence[0].lower()}{sentence[1:]}" if subject else sentence
+
+    def _sentence(self) -> str:
         where = f"in the {100 * self.coverage:.0f} % of the image that the boards covered"
         if not self.covered_sufficient:
-            begin = f"{subject}: n" if subject else "N"
             known = f"{known_to(self.covered_deg, self.covered_px)} {where}"
-            return f"{begin}ot good for measuring: {known}. Add sharp images of tilted boards all over the image."
-        good = f"{begin}ood to {known_to(self.covered_deg)} {where}"
+            return f"Not good for measuring: {known}. Add sharp images of tilted boards all over the image."
+        good = f"Good to {known_to(self.covered_deg)} {where}"
         if not isfinite(self.corner_px) and self.corners_sufficient:
             return f"{good}; a corner has no ray."
         if self.corners_sufficient:
