@@ -24,6 +24,7 @@ from camviz_clinic.checks.evidence import Evidence
 from camviz_clinic.checks.fields import smooth_field, warp_columns
 from camviz_clinic.checks.findings import lens as lens_findings
 from camviz_clinic.checks.findings.boards import coverage, held_out_ratio
+from camviz_clinic.checks.findings.pair import confused_units
 from camviz_clinic.checks.observed import explained, parameter_columns
 from camviz_clinic.checks.rig import fits_better
 from camviz_clinic.checks.virtual import single
@@ -580,3 +581,19 @@ def test_two_baselines_differ_in_millimetres_and_in_depth():
     assert one(inspect(pair(80.0), compare=pair(0.08)), "baseline-scale").causes == ("millimetres taken for metres",)
     near = (math.exp(0.02 * 0.999), math.exp(0.02 * 1.001))
     assert ["baseline-scale" in ids(inspect(pair(0.08 * r), compare=pair(0.08))) for r in near] == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("ratio", "units"),
+    [
+        (1000, ("millimetres", "metres")),
+        (100, ("centimetres", "metres")),
+        (1 / 0.0254, ("inches", "metres")),
+        (1 / 0.3048, ("feet", "metres")),
+        (1 / 25.4, ("inches", "millimetres")),
+    ],
+)
+def test_confused_units_are_named_within_two_percent(ratio, units):
+    """A metre has 1/0.0254 inches and 1/0.3048 feet (international yard and pound agreement of 1959)."""
+    assert confused_units(ratio * math.exp(0.0199)) == confused_units(ratio * math.exp(-0.0199)) == units
+    assert confused_units(ratio * math.exp(0.0201)) is None
